@@ -1,0 +1,1 @@
+//! Ray queries: the tree over triangles, closest hit and occlusion.

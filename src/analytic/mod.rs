@@ -1,0 +1,1 @@
+//! Closed forms: what a pixel or a point must see, without sampling.

@@ -1,0 +1,1 @@
+//! Experiments: from a JSON file to rows of results, resumable.

@@ -1,0 +1,213 @@
+//! Linear radiance images: EXR with provenance, PNG with exposure, and outputs that are whole or absent.
+
+use std::io::{Cursor, Write};
+use std::path::Path;
+
+use exr::prelude::*;
+
+use crate::error::{Error, Result};
+
+/// Linear radiance, `f32` RGB, top row first: `pixels[y * width + x]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Image {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width * height` pixels, row by row from the top.
+    pub pixels: Vec<[f32; 3]>,
+}
+
+impl Image {
+    /// A black image.
+    pub fn black(width: u32, height: u32) -> Self {
+        Self { width, height, pixels: vec![[0.0; 3]; width as usize * height as usize] }
+    }
+}
+
+/// Writes `bytes` under a temporary name beside `path`, then renames it: a reader sees the old file or the whole new one.
+///
+/// # Errors
+/// Kind [`ErrorKind::Write`](crate::error::ErrorKind::Write) with the system's reason.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    let fail = |e: std::io::Error| Error::write(path, format!("cannot write: {e}"));
+    if let Some(folder) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
+        std::fs::create_dir_all(folder).map_err(fail)?;
+    }
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(format!(".{}.partial", std::process::id()));
+    let partial = Path::new(&partial);
+    let written = (|| {
+        let mut file = std::fs::File::create(partial)?;
+        file.write_all(bytes)?;
+        file.sync_data()?;
+        std::fs::rename(partial, path)
+    })();
+    if written.is_err() {
+        // Best effort: the message below is about the write, not about the tidying.
+        let _ = std::fs::remove_file(partial);
+    }
+    written.map_err(fail)
+}
+
+/// Prefix of the provenance attributes in EXR files.
+const ATTRIBUTE_PREFIX: &str = "sampler_lab.";
+
+/// Writes a lossless OpenEXR image, `f32` channels R G B, with `provenance` as text attributes `sampler_lab.*`.
+///
+/// # Errors
+/// Kind `Write` where the file cannot be written.
+pub fn write_exr(path: &Path, image: &Image, provenance: &[(String, String)]) -> Result<()> {
+    let size = Vec2(image.width as usize, image.height as usize);
+    let channels = SpecificChannels::rgb(|at: Vec2<usize>| {
+        let [r, g, b] = image.pixels[at.y() * image.width as usize + at.x()];
+        (r, g, b)
+    });
+    let mut layer = LayerAttributes::named("");
+    layer.layer_name = None;
+    for (name, value) in provenance {
+        let name = Text::from(format!("{ATTRIBUTE_PREFIX}{name}").as_str());
+        layer.other.insert(name, AttributeValue::Text(Text::from(value.as_str())));
+    }
+    let encoding = Encoding { compression: Compression::ZIP16, ..Encoding::default() };
+    let file = exr::prelude::Image::from_layer(Layer::new(size, layer, encoding, channels));
+    let mut bytes = Cursor::new(Vec::new());
+    file.write()
+        .non_parallel()
+        .to_buffered(&mut bytes)
+        .map_err(|e| Error::write(path, format!("cannot encode EXR: {e}")))?;
+    write_whole(path, bytes.get_ref())
+}
+
+/// Reads the R, G and B channels of an OpenEXR image and its `sampler_lab.*` attributes.
+///
+/// # Errors
+/// Kind `Input` where the file is missing, torn or has no R G B channels.
+pub fn read_exr(path: &Path) -> Result<(Image, Vec<(String, String)>)> {
+    let bad = |e: &dyn std::fmt::Display| {
+        Error::input(path.display(), format!("expected an OpenEXR image with channels R G B, found: {e}"))
+    };
+    let bytes = std::fs::read(path).map_err(|e| bad(&e))?;
+    let file = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgb_channels(
+            |size, _| Image::black(size.width() as u32, size.height() as u32),
+            |image: &mut Image, at, (r, g, b): (f32, f32, f32)| {
+                image.pixels[at.y() * image.width as usize + at.x()] = [r, g, b];
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .non_parallel()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(|e| bad(&e))?;
+    let mut provenance: Vec<(String, String)> = file
+        .layer_data
+        .attributes
+        .other
+        .iter()
+        .filter_map(|(name, value)| match value {
+            AttributeValue::Text(text) => {
+                Some((name.to_string().strip_prefix(ATTRIBUTE_PREFIX)?.to_owned(), text.to_string()))
+            }
+            _ => None,
+        })
+        .collect();
+    provenance.sort();
+    Ok((file.layer_data.channel_data.pixels, provenance))
+}
+
+/// The framework's filmic curve, before normalisation: H(x) of SPEC §2.
+fn hable(x: f32) -> f32 {
+    const A: f32 = 0.15;
+    const B: f32 = 0.50;
+    const C: f32 = 0.10;
+    const D: f32 = 0.20;
+    const E: f32 = 0.02;
+    const F: f32 = 0.30;
+    (x * (A * x + C * B) + D * E) / (x * (A * x + B) + D * F) - E / F
+}
+
+/// Linear in [0, 1] → sRGB in [0, 1] (IEC 61966-2-1).
+pub fn srgb_encode(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::powf(linear, 1.0 / 2.4) - 0.055 }
+}
+
+/// sRGB in [0, 1] → linear in [0, 1] (IEC 61966-2-1).
+pub fn srgb_decode(encoded: f32) -> f32 {
+    if encoded <= 0.040_45 { encoded / 12.92 } else { libm::powf((encoded + 0.055) / 1.055, 2.4) }
+}
+
+/// One channel on its way to the screen: sRGB(clamp(H(exposure·c) / H(11.2), 0, 1)).
+pub fn tone_map(radiance: f32, exposure: f32) -> f32 {
+    srgb_encode((hable(exposure * radiance) / hable(11.2)).clamp(0.0, 1.0))
+}
+
+/// 8-bit RGB as shown on a screen, top row first.
+pub fn to_screen(image: &Image, exposure: f32) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(image.pixels.len() * 3);
+    for pixel in &image.pixels {
+        bytes.extend(pixel.map(|c| (tone_map(c, exposure) * 255.0 + 0.5) as u8));
+    }
+    bytes
+}
+
+/// Writes 8-bit RGB `bytes` (top row first) as PNG.
+///
+/// # Errors
+/// Kind `Write` where the file cannot be written.
+pub fn write_png_rgb8(path: &Path, width: u32, height: u32, bytes: &[u8]) -> Result<()> {
+    use image::ImageEncoder;
+    use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+    let mut png = Vec::new();
+    PngEncoder::new_with_quality(&mut png, CompressionType::Best, FilterType::Adaptive)
+        .write_image(bytes, width, height, image::ExtendedColorType::Rgb8)
+        .map_err(|e| Error::write(path, format!("cannot encode PNG: {e}")))?;
+    write_whole(path, &png)
+}
+
+/// Writes a tone-mapped PNG.
+///
+/// # Errors
+/// Kind `Write` where the file cannot be written.
+pub fn write_png(path: &Path, image: &Image, exposure: f32) -> Result<()> {
+    write_png_rgb8(path, image.width, image.height, &to_screen(image, exposure))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exr_round_trip_keeps_every_bit_and_the_provenance() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let mut image = Image::black(5, 3);
+        for (i, p) in image.pixels.iter_mut().enumerate() {
+            *p = [i as f32 * 0.1, 1e-30, 3e9 + i as f32];
+        }
+        let provenance = vec![("seed".to_owned(), "7".to_owned()), ("version".to_owned(), "0".to_owned())];
+        write_exr(&path, &image, &provenance).unwrap();
+        assert_eq!(read_exr(&path).unwrap(), (image, provenance));
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no partial file is left");
+    }
+
+    #[test]
+    fn tone_curve_ends_are_black_and_white() {
+        assert_eq!(tone_map(0.0, 3.0), 0.0);
+        assert_eq!(tone_map(11.2, 1.0), srgb_encode(1.0));
+        assert!((srgb_encode(1.0) - 1.0).abs() < 1e-6);
+        assert!((srgb_decode(srgb_encode(0.2)) - 0.2).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_torn_exr_is_an_input_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("torn.exr");
+        write_exr(&path, &Image::black(8, 8), &[]).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+        assert_eq!(read_exr(&path).unwrap_err().exit_code(), 2);
+    }
+}

@@ -1,0 +1,11 @@
+//! What does the choice of sample points do to a rendered image? Answered with numbers.
+pub mod accel;
+pub mod analytic;
+pub mod error;
+pub mod experiment;
+pub mod film;
+pub mod render;
+pub mod report;
+pub mod sampling;
+pub mod scene;
+pub mod stats;

@@ -1,0 +1,1 @@
+//! Reports: figures, tables and sentences out of rows.

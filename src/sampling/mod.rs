@@ -1,0 +1,1 @@
+//! Sample points: sets, orders, randomisations, and who reads which numbers.

@@ -1,0 +1,1 @@
+//! Scenes: config files, meshes, camera, lights.

@@ -1,0 +1,1 @@
+//! Statistics: discrepancies, moments, image errors, fits and tests.
