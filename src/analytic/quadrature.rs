@@ -31,7 +31,7 @@ const KRONROD: [f64; 8] = [
 ];
 /// Weights of G7 at `NODES[1]`, `NODES[3]`, `NODES[5]`, then at 0.
 const GAUSS: [f64; 4] =
-    [0.129_484_966_168_869_7, 0.279_705_391_489_276_64, 0.381_830_050_505_118_93, 0.417_959_183_673_469_4];
+    [0.129_484_966_168_869_7, 0.279_705_391_489_276_64, 0.381_830_050_505_118_9, 0.417_959_183_673_469_4];
 
 /// A panel is halved at most this many times: its width is then 2⁻⁴⁸ of the first one's.
 pub const MAX_DEPTH: u32 = 48;
