@@ -45,28 +45,40 @@ impl DiskLight {
     }
 
     /// Variance A² E\[g²\] − E² of *one* uniform-area sample A g, g = k_e cos θ cos θ_l / r², in the setting of
-    /// [`Self::irradiance`]: by quadrature in polar coordinates to 10⁻¹⁰ relative.
+    /// [`Self::irradiance`]: by quadrature in polar coordinates to 10⁻¹⁰ relative and the rounding of a radius beside
+    /// h. Near the disk it grows as A π k_e² / (3 h²).
     ///
-    /// Errors: the quadrature does not reach that (a height below some 10⁻⁶ of the radius, where the variance itself
-    /// grows as A π k_e² / (3 h²)).
+    /// Errors: the quadrature does not get there (a height within rounding of the disk).
     pub fn variance_of_one_area_sample(&self, height: f64, offset: f64) -> Result<f64> {
         if height <= 0.0 {
             return Ok(0.0);
         }
+        let offset = offset.abs();
         let mean = self.irradiance(height, offset);
         let area = PI * self.radius * self.radius;
         // The squared deviation, not E[g²] − E²: the latter cancels for a far disk. Both halves of the disk are alike.
         let deviation = |r: f64, turn: f64| {
-            let square = r * r + offset * offset - 2.0 * r * offset * libm::cos(turn) + height * height;
+            // r² + a² − 2 r a cos(turn) + h², which would cancel below the disk.
+            let half_sine = libm::sin(0.5 * turn);
+            let square = (r - offset) * (r - offset) + 4.0 * r * offset * half_sine * half_sine + height * height;
             let cosine_over_distance = height / square;
             let sample = area * self.emission * cosine_over_distance * cosine_over_distance;
             2.0 * r * (sample - mean) * (sample - mean)
         };
         // Where a sample equals the mean, rounding alone is left: 10⁻¹⁰ of the mean, squared, counts as nothing.
         let tolerance = Tolerance { absolute: 1e-20 * mean * mean * area, relative: 1e-10 };
-        let none = |_: f64, _: &mut Vec<f64>| {};
-        let breaks = [offset.abs(), offset.abs() - height, offset.abs() + height];
-        let integral = integrate_rectangle(deviation, [0.0, self.radius], [0.0, PI], &breaks, none, tolerance)?;
+        // The peak below the point is `height` wide: panels that grow from there cannot overlook it.
+        let widths =
+            |from: f64, to: f64| std::iter::successors(Some(from), |w| Some(4.0 * w)).take_while(move |&w| w < to);
+        let radii: Vec<f64> =
+            widths(height, self.radius).flat_map(|w| [offset - w, offset + w]).chain([offset]).collect();
+        let turns = |r: f64, out: &mut Vec<f64>| {
+            let around = libm::sqrt(r * offset);
+            if around > 0.0 {
+                out.extend(widths(libm::hypot(r - offset, height) / around, PI));
+            }
+        };
+        let integral = integrate_rectangle(deviation, [0.0, self.radius], [0.0, PI], &radii, turns, tolerance)?;
         Ok(integral.value / area)
     }
 }
@@ -107,5 +119,21 @@ mod tests {
             (DISK.irradiance(0.0, 0.0), DISK.irradiance(-1.0, 0.0), DISK.irradiance_on_axis(0.0)),
             (0.0, 0.0, 0.0)
         );
+    }
+
+    #[test]
+    fn the_variance_has_its_near_and_far_limits() {
+        for (h, a) in [(1e-3, 0.0), (1e-3, 0.2), (1e-5, 0.2), (1e-6, 0.3), (1e-8, 0.2)] {
+            let limit = PI * 0.25 * PI / (3.0 * h * h) - PI * PI;
+            let found = DISK.variance_of_one_area_sample(h, a).unwrap();
+            // A radius near a = 0.2 is known to 3·10⁻¹⁷, beside a peak h wide.
+            assert!((found / limit - 1.0).abs() <= 10.0 * h * h + 1e-10 + 3e-17 / h, "{h} {a}: {found:e} {limit:e}");
+        }
+        // Far on the axis a sample is A (1 − 2r²/h²)/h², and r² is uniform on 0..R²: variance 4 A² R⁴/12 / h⁸.
+        for h in [1e2f64, 1e4] {
+            let limit = 4.0 * (PI * 0.25).powi(2) * 0.5f64.powi(4) / 12.0 / h.powi(8);
+            let found = DISK.variance_of_one_area_sample(h, 0.0).unwrap();
+            assert!((found / limit - 1.0).abs() <= 10.0 / (h * h) + 4e-15 * h * h, "{h}: {found:e} {limit:e}");
+        }
     }
 }

@@ -4,7 +4,8 @@
 //! rule has degree 22 (Kronrod 1965; nodes as in QUADPACK's QK15, Piessens et al. 1983). |K15 − G7| is taken as the
 //! error of K15, which overstates it where the integrand is smooth. The worst panel is halved until the sum of all
 //! errors is small enough, so that kinks cost panels only where they lie; a kink at a *known* place should be
-//! handed over as a break, and then costs nothing.
+//! handed over as a break, and then costs nothing. A peak too narrow for any of a panel's points is overlooked without a
+//! sign: whoever knows of one hands over breaks that close in on it.
 
 use crate::error::{Error, Result};
 
