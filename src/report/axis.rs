@@ -81,7 +81,8 @@ impl LogAxis {
     fn multiples(&self, mantissas: &[f64]) -> Vec<f64> {
         let decades = libm::floor(self.low) as i32..=libm::ceil(self.high) as i32;
         // Divided rather than multiplied below 1, so that 0.2 is the number nearest to two tenths.
-        let scaled = |m: f64, e: i32| if e < 0 { m / libm::pow(10.0, -f64::from(e)) } else { m * libm::pow(10.0, e.into()) };
+        let scaled =
+            |m: f64, e: i32| if e < 0 { m / libm::pow(10.0, -f64::from(e)) } else { m * libm::pow(10.0, e.into()) };
         decades.flat_map(|e| mantissas.iter().map(move |&m| scaled(m, e))).filter(|&v| self.holds(v)).collect()
     }
 }
@@ -99,7 +100,8 @@ pub(super) fn number_label(value: f64) -> String {
     let scientific = format!("{value:.2e}");
     let (digits, power) = scientific.split_once('e').unwrap_or((&scientific, "0"));
     let power: i32 = power.parse().unwrap_or(0);
-    let trimmed = |s: &str| if s.contains('.') { s.trim_end_matches('0').trim_end_matches('.').to_owned() } else { s.to_owned() };
+    let trimmed =
+        |s: &str| if s.contains('.') { s.trim_end_matches('0').trim_end_matches('.').to_owned() } else { s.to_owned() };
     match power {
         0..=4 if value.fract() == 0.0 => format!("{value}"),
         -3..=4 => trimmed(&format!("{value:.*}", (2 - power).max(0) as usize)),
@@ -160,9 +162,21 @@ mod tests {
     #[test]
     fn numbers_are_written_short_and_exact() {
         let cases = [
-            (1.0, "1"), (26.0, "26"), (65536.0, "65536"), (131072.0, "2¹⁷"), (16777216.0, "2²⁴"), (100000.0, "1e5"),
-            (0.002, "0.002"), (0.1, "0.1"), (0.0005, "5e-4"), (2e-6, "2e-6"), (1e-12, "1e-12"), (0.01234, "0.0123"),
-            (1.5, "1.5"), (0.0, "0"), (123.4, "123"),
+            (1.0, "1"),
+            (26.0, "26"),
+            (65536.0, "65536"),
+            (131072.0, "2¹⁷"),
+            (16777216.0, "2²⁴"),
+            (100000.0, "1e5"),
+            (0.002, "0.002"),
+            (0.1, "0.1"),
+            (0.0005, "5e-4"),
+            (2e-6, "2e-6"),
+            (1e-12, "1e-12"),
+            (0.01234, "0.0123"),
+            (1.5, "1.5"),
+            (0.0, "0"),
+            (123.4, "123"),
         ];
         for (value, label) in cases {
             assert_eq!(number_label(value), label);

@@ -6,7 +6,7 @@ use super::axis::{LogAxis, number_label};
 use super::figure::{
     Align, Bounds, Colour, Dash, Drawing, Figure, PAGE_WIDTH, Place, Text, shortened, text_width, wrapped,
 };
-use super::labels::{kept_apart, spread};
+use super::labels::{first_free, kept_apart, spread};
 use super::style::{GREY, GRID, INK, PALE, Style, draw_key, draw_marker, lightened, style_of};
 
 /// One measured value of a series.
@@ -139,7 +139,8 @@ pub fn small_multiples(frame: &Frame, plots: &[Plot], columns: usize) -> Figure 
     let panel_height = (width * 0.95).clamp(210.0, 330.0);
     let last_row = plots.len().saturating_sub(columns);
     let foot = axes.foot();
-    let height = header.height + rows as f64 * (title + panel_height) + (rows - 1) as f64 * 22.0 + foot + legend.height();
+    let height =
+        header.height + rows as f64 * (title + panel_height) + (rows - 1) as f64 * 22.0 + foot + legend.height();
     let mut drawing = Drawing::new(PAGE_WIDTH, height);
     header.draw(&mut drawing);
     let at = |i: usize| {
@@ -151,7 +152,15 @@ pub fn small_multiples(frame: &Frame, plots: &[Plot], columns: usize) -> Figure 
         let panel = Panel::new(&axes, at(i));
         let name = shortened(&plot.title, 13.0, true, width);
         let place = (at(i).left, at(i).top - 7.0);
-        drawing.add_text(Text { at: place, text: name, size: 13.0, bold: true, colour: INK, align: Align::Left, turned: false });
+        drawing.add_text(Text {
+            at: place,
+            text: name,
+            size: 13.0,
+            bold: true,
+            colour: INK,
+            align: Align::Left,
+            turned: false,
+        });
         panel.draw_frame(&mut drawing, i % columns == 0, i >= last_row);
         panel.draw_helpers(&mut drawing, plot, false);
         panel.draw_lines(&mut drawing, plot);
@@ -244,7 +253,8 @@ impl<'a> Axes<'a> {
         let reach = |p: &Datum| p.interval.map(|(l, h)| [l.max(low / INTERVAL_REACH), h.min(high * INTERVAL_REACH)]);
         let floors = plots.iter().filter_map(|plot| plot.floor.as_ref()).map(|floor| floor.value);
         let floors = floors.filter(|&value| value >= low / FLOOR_REACH && value <= high * FLOOR_REACH);
-        let y_values = data(plots).flat_map(|p| std::iter::once(p.y).chain(reach(p).into_iter().flatten())).chain(floors);
+        let y_values =
+            data(plots).flat_map(|p| std::iter::once(p.y).chain(reach(p).into_iter().flatten())).chain(floors);
         let (x, y) =
             (LogAxis::around(data(plots).map(|p| p.x), 0.03, 0.0, 1.0), LogAxis::around(y_values, 0.04, 0.0, 1.0));
         let mut measured: Vec<f64> = data(plots).map(|p| p.x).collect();
@@ -371,14 +381,15 @@ impl<'a> Panel<'a> {
     /// the plot; all others are written along the lines.
     fn draw_helpers(&self, drawing: &mut Drawing, plot: &Plot, beside: bool) -> Vec<Ending> {
         let mut column = Vec::new();
-        let mut taken: Vec<Bounds> = Vec::new();
+        let mut taken = self.obstacles(plot);
         let floor = plot.floor.iter().filter(|floor| self.y.holds(floor.value)).map(|floor| {
             let y = self.y.pixel(floor.value);
             (vec![(self.b.left, y), (self.b.right, y)], Dash::Dotted, floor.label.as_str())
         });
-        let guides = plot.guides.iter().filter_map(|guide| {
-            Some((self.guide(plot, guide.slope)?, Dash::Solid, guide.label.as_str()))
-        });
+        let guides = plot
+            .guides
+            .iter()
+            .filter_map(|guide| Some((self.guide(plot, guide.slope)?, Dash::Solid, guide.label.as_str())));
         for (line, dash, label) in floor.chain(guides) {
             drawing.line(&line, 1.1, PALE, dash);
             let end = line[1];
@@ -399,29 +410,60 @@ impl<'a> Panel<'a> {
         let middle = libm::exp(logs.iter().sum::<f64>() / logs.len() as f64);
         let (_, right) = self.x.ends();
         let from = (self.x.pixel(start), self.y.pixel(middle));
-        let to = (self.b.right, self.y.pixel(1.0) + (self.y.pixel(10.0) - self.y.pixel(1.0))
-            * (libm::log10(middle) + slope * libm::log10(right / start)));
+        let to = (
+            self.b.right,
+            self.y.pixel(1.0)
+                + (self.y.pixel(10.0) - self.y.pixel(1.0)) * (libm::log10(middle) + slope * libm::log10(right / start)),
+        );
         let edge = to.1.clamp(self.b.top, self.b.bottom);
         let part = if edge == to.1 { 1.0 } else { (edge - from.1) / (to.1 - from.1) };
         let visible = part.is_finite() && (0.0..=1.0).contains(&part) && from.0 < to.0;
         visible.then(|| vec![from, (from.0 + part * (to.0 - from.0), edge)])
     }
 
-    /// Writes `label` near the line's end on white, a little further up the line where another label stands.
+    /// Small boxes all along the series' lines, which labels inside the panel keep clear of.
+    fn obstacles(&self, plot: &Plot) -> Vec<Bounds> {
+        let mut boxes = Vec::new();
+        for series in &plot.series {
+            let places: Vec<Place> = series.points.iter().map(|p| (self.x.pixel(p.x), self.y.pixel(p.y))).collect();
+            for ends in places.windows(2) {
+                let (dx, dy) = (ends[1].0 - ends[0].0, ends[1].1 - ends[0].1);
+                let steps = (dx.abs().max(dy.abs()) / 4.0).ceil().max(1.0) as u32;
+                let at = (0..=steps)
+                    .map(|i| f64::from(i) / f64::from(steps))
+                    .map(|t| (ends[0].0 + t * dx, ends[0].1 + t * dy));
+                boxes.extend(at.map(|(x, y)| Bounds { left: x - 3.0, top: y - 3.0, right: x + 3.0, bottom: y + 3.0 }));
+            }
+        }
+        boxes
+    }
+
+    /// Writes `label` beside the line, as near to its end as there is room; nowhere if there is none (a grid's
+    /// legend names the guides too).
     fn draw_inside_label(&self, drawing: &mut Drawing, line: &[Place], label: &str, taken: &mut Vec<Bounds>) {
         let (from, to) = (line[0], line[1]);
-        for step in 0..12 {
-            let back = f64::from(step) * 0.06;
-            let at = (to.0 - back * (to.0 - from.0) - 3.0, to.1 - back * (to.1 - from.1) - 4.0);
-            let size = 10.5;
-            let text = Text { at, text: label.to_owned(), size, bold: false, colour: GREY, align: Align::Right, turned: false };
-            let bounds = text.bounds();
-            if bounds.inside(&self.b) && !taken.iter().any(|other| other.overlaps(&bounds)) {
-                drawing.rectangle(bounds, [255; 3], 0.75);
-                taken.push(bounds);
-                drawing.add_text(text);
-                return;
-            }
+        let text = |at: Place| Text {
+            at,
+            text: label.to_owned(),
+            size: 10.5,
+            bold: false,
+            colour: GREY,
+            align: Align::Right,
+            turned: false,
+        };
+        let width = text_width(label, 10.5, false);
+        let rise = if to.1 == from.1 { 0.0 } else { (to.1 - from.1) / (to.0 - from.0) };
+        let candidates = (0..25).flat_map(|step| {
+            let x = to.0 - 3.0 - f64::from(step) * 0.025 * (to.0 - from.0);
+            let on_line = |x: f64| from.1 + rise * (x - from.0);
+            // Above a falling line the text's left end is nearest to it from above, below it the right end.
+            let above = (x, on_line(x - width).min(on_line(x)) - 4.0);
+            let below = (x, on_line(x - width).max(on_line(x)) + 11.0);
+            [above, below].map(|at| (text(at).bounds(), at))
+        });
+        if let Some((bounds, at)) = first_free(candidates, &self.b, taken) {
+            taken.push(bounds);
+            drawing.add_text(text(at));
         }
     }
 
@@ -467,7 +509,8 @@ impl<'a> Panel<'a> {
                 _ => {
                     let there = run.iter().map(|p| edge(p, true));
                     let back = run.iter().rev().map(|p| edge(p, false));
-                    drawing.area(&there.chain(back).collect::<Vec<_>>(), series.style.colour, 0.16);
+                    let tint = lightened(series.style.colour, 0.3);
+                    drawing.area(&there.chain(back).collect::<Vec<_>>(), tint, 0.18);
                 }
             }
         }
@@ -489,7 +532,12 @@ fn draw_column(drawing: &mut Drawing, b: &Bounds, endings: &[Ending], width: f64
     for (ending, y) in endings.iter().zip(places) {
         let from = (ending.at.0 + if ending.style.is_some() { 6.0 } else { 0.0 }, ending.at.1);
         let colour = ending.style.map_or(GRID, |style| lightened(style.colour, 0.55));
-        drawing.line(&[from, (b.right.max(from.0) + 2.0, from.1), (left - 4.0, y), (left, y)], 0.8, colour, Dash::Solid);
+        drawing.line(
+            &[from, (b.right.max(from.0) + 2.0, from.1), (left - 4.0, y), (left, y)],
+            0.8,
+            colour,
+            Dash::Solid,
+        );
         let text = shortened(&ending.text, SMALL, false, width);
         match &ending.style {
             Some(style) => {
@@ -501,45 +549,72 @@ fn draw_column(drawing: &mut Drawing, b: &Bounds, endings: &[Ending], width: f64
     }
 }
 
-/// One key for all panels.
+/// One key for all panels: the series, and below them what the grey lines are.
 struct Legend {
-    entries: Vec<(String, Option<Style>)>,
+    entries: Vec<(String, Style)>,
+    floors: Vec<String>,
+    guides: Vec<Guide>,
     columns: usize,
     step: f64,
 }
 
+const LEGEND_STEP: f64 = 18.0;
+
 impl Legend {
-    /// Labels in the order they first appear, and the floor's.
+    /// Labels in the order they first appear.
     fn of(plots: &[Plot]) -> Self {
-        let mut entries: Vec<(String, Option<Style>)> = Vec::new();
-        let series = plots.iter().flat_map(|plot| &plot.series).map(|s| (s.label.clone(), Some(s.style)));
-        let floors = plots.iter().filter_map(|plot| plot.floor.as_ref()).map(|floor| (floor.label.clone(), None));
-        for entry in series.chain(floors) {
-            if !entries.iter().any(|known| known.0 == entry.0) {
-                entries.push(entry);
+        let mut entries: Vec<(String, Style)> = Vec::new();
+        for series in plots.iter().flat_map(|plot| &plot.series) {
+            if !entries.iter().any(|(label, _)| *label == series.label) {
+                entries.push((series.label.clone(), series.style));
             }
         }
+        let mut floors: Vec<String> =
+            plots.iter().filter_map(|plot| plot.floor.as_ref()).map(|f| f.label.clone()).collect();
+        floors.dedup();
+        let mut guides: Vec<Guide> = plots.iter().flat_map(|plot| plot.guides.iter().cloned()).collect();
+        guides.sort_by(|a, b| b.slope.total_cmp(&a.slope));
+        guides.dedup();
         let widest = entries.iter().map(|(text, _)| text_width(text, SMALL, false)).fold(40.0, f64::max);
-        let step = (KEY + 6.0 + widest + 18.0).min(PAGE_WIDTH - 80.0);
+        let step = (KEY + 6.0 + widest + 16.0).min(PAGE_WIDTH - 80.0);
         let fitting = (((PAGE_WIDTH - 60.0) / step) as usize).max(1);
-        // As few rows as fit, and those equally long: six families in two presets stand below each other.
+        // As few rows as fit, and those equally long.
         let rows = entries.len().div_ceil(fitting).max(1);
-        Self { columns: entries.len().div_ceil(rows).max(1), entries, step }
+        Self { columns: entries.len().div_ceil(rows).max(1), entries, floors, guides, step }
+    }
+
+    fn rows(&self) -> usize {
+        self.entries.len().div_ceil(self.columns)
     }
 
     fn height(&self) -> f64 {
-        12.0 + 18.0 * self.entries.len().div_ceil(self.columns) as f64
+        let helpers = usize::from(!self.floors.is_empty() || !self.guides.is_empty());
+        10.0 + LEGEND_STEP * (self.rows() + helpers) as f64
     }
 
     fn draw(&self, drawing: &mut Drawing, left: f64, top: f64) {
+        // Presets of one family that follow each other stand below each other.
+        let by_column = self.entries.len() > 1 && self.entries[0].1.colour == self.entries[1].1.colour;
         for (i, (text, style)) in self.entries.iter().enumerate() {
-            let (x, y) = (left + (i % self.columns) as f64 * self.step, top + 10.0 + (i / self.columns) as f64 * 18.0);
-            match style {
-                Some(style) => draw_key(drawing, x, y, KEY, style),
-                None => drawing.line(&[(x, y), (x + KEY, y)], 1.1, PALE, Dash::Dotted),
-            }
+            let (column, row) =
+                if by_column { (i / self.rows(), i % self.rows()) } else { (i % self.columns, i / self.columns) };
+            let (x, y) = (left + column as f64 * self.step, top + 8.0 + row as f64 * LEGEND_STEP);
+            draw_key(drawing, x, y, KEY, style);
             let text = shortened(text, SMALL, false, self.step - KEY - 10.0);
             drawing.text((x + KEY + 6.0, y + 4.0), &text, SMALL, INK, Align::Left);
+        }
+        self.draw_helpers(drawing, left, top + 8.0 + self.rows() as f64 * LEGEND_STEP);
+    }
+
+    fn draw_helpers(&self, drawing: &mut Drawing, left: f64, y: f64) {
+        let guides = self.guides.iter().map(|guide| guide.label.as_str()).collect::<Vec<_>>().join(", ");
+        let order = if self.guides.len() > 1 { " (from the top)" } else { "" };
+        let entries = [(self.floors.join(", "), Dash::Dotted), (format!("{guides}{order}"), Dash::Solid)];
+        let mut x = left;
+        for (text, dash) in entries.iter().filter(|entry| !entry.0.is_empty()) {
+            drawing.line(&[(x, y), (x + KEY, y)], 1.1, PALE, *dash);
+            drawing.text((x + KEY + 6.0, y + 4.0), text, SMALL, INK, Align::Left);
+            x += KEY + 6.0 + text_width(text, SMALL, false) + 24.0;
         }
     }
 }
