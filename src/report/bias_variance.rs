@@ -44,7 +44,9 @@ pub struct Group {
     pub rows: Vec<BiasVariance>,
 }
 
-const ROW: f64 = 21.0;
+const ROW: f64 = 25.0;
+/// Every second row stands on it.
+const STRIPE: Colour = [245; 3];
 const HEADING: f64 = 26.0;
 const BIAS: Style = Style { colour: [213, 94, 0], marker: Marker::Diamond, filled: true, dash: Dash::Solid };
 const VARIANCE: Style = Style { colour: [0, 114, 178], marker: Marker::Circle, filled: true, dash: Dash::Solid };
@@ -55,9 +57,14 @@ const BELOW: f64 = 30.0;
 /// intervals.
 ///
 /// An estimate at or below 0 is an arrow that points left, from its interval's upper end, or from the left edge where
-/// that too is at or below 0: below noise. One that is not finite is said to be so. `frame.y_label` and
+/// that too is at or below 0: below noise. An interval that reaches down to 0 ends in the same arrow behind its
+/// marker. An estimate that is not finite is said to be so. `frame.y_label` and
 /// `frame.x_ticks` are not used.
 pub fn bias_variance_chart(frame: &Frame, groups: &[Group]) -> Figure {
+    drawn(frame, groups).finish(&frame.title)
+}
+
+fn drawn(frame: &Frame, groups: &[Group]) -> Drawing {
     let rows = groups.iter().flat_map(|group| &group.rows);
     let widest = rows.clone().map(|row| text_width(&row.label, SMALL, false)).fold(60.0, f64::max).min(220.0);
     let header = Header::new(frame, &[]);
@@ -69,6 +76,7 @@ pub fn bias_variance_chart(frame: &Frame, groups: &[Group]) -> Figure {
     let b = Bounds { left: 12.0 + 20.0 + widest + 12.0, top, right: PAGE_WIDTH - 24.0, bottom: top + body };
     draw_key_line(&mut drawing, b.left, header.height + 6.0);
     let axis = LogAxis::around(rows.flat_map(ends), 0.04, b.left + BELOW, b.right);
+    draw_stripes(&mut drawing, groups, &b);
     draw_frame(&mut drawing, &axis, &b, &frame.x_label);
     let mut y = b.top + 4.0;
     for group in groups {
@@ -78,11 +86,7 @@ pub fn bias_variance_chart(frame: &Frame, groups: &[Group]) -> Figure {
             drawing.add_text(Text { at, text, size: 13.0, bold: true, colour: INK, align: Align::Left, turned: false });
             y += HEADING;
         }
-        for (i, row) in group.rows.iter().enumerate() {
-            if i % 2 == 0 {
-                let band = Bounds { left: 12.0, top: y, right: b.right, bottom: y + ROW };
-                drawing.rectangle(band, GRID, 0.35);
-            }
+        for row in &group.rows {
             draw_row(&mut drawing, &axis, &b, row, y + ROW / 2.0, widest);
             y += ROW;
         }
@@ -90,7 +94,19 @@ pub fn bias_variance_chart(frame: &Frame, groups: &[Group]) -> Figure {
     if y < b.top + ROW {
         drawing.text(((b.left + b.right) / 2.0, (b.top + b.bottom) / 2.0 + 5.0), "no data", TITLE, GREY, Align::Centre);
     }
-    drawing.finish(&frame.title)
+    drawing
+}
+
+fn draw_stripes(drawing: &mut Drawing, groups: &[Group], b: &Bounds) {
+    let mut top = b.top + 4.0;
+    for group in groups {
+        top += if group.title.is_empty() { 0.0 } else { HEADING };
+        for i in (0..group.rows.len()).step_by(2) {
+            let y = top + i as f64 * ROW;
+            drawing.rectangle(Bounds { left: 12.0, top: y, right: b.right, bottom: y + ROW }, STRIPE, 1.0);
+        }
+        top += group.rows.len() as f64 * ROW;
+    }
 }
 
 /// How far below its value an interval's low end may stretch the axis.
@@ -117,7 +133,7 @@ fn draw_key_line(drawing: &mut Drawing, left: f64, y: f64) {
     arrow(drawing, x + 22.0, x, y, GREY);
     drawing.text(
         (x + 30.0, y + 4.0),
-        "below noise: estimate not above 0, from its upper limit",
+        "reaches 0 or below; without a marker the estimate itself does (below noise)",
         SMALL,
         GREY,
         Align::Left,
@@ -145,10 +161,10 @@ fn draw_frame(drawing: &mut Drawing, axis: &LogAxis, b: &Bounds, name: &str) {
 fn draw_row(drawing: &mut Drawing, axis: &LogAxis, b: &Bounds, row: &BiasVariance, y: f64, width: f64) {
     draw_marker(drawing, (21.0, y), 3.6, &row.style);
     drawing.text((32.0, y + 4.0), &shortened(&row.label, SMALL, false, width), SMALL, INK, Align::Left);
-    draw_estimate(drawing, axis, b, row.bias_squared, &BIAS, y - 4.0);
+    draw_estimate(drawing, axis, b, row.bias_squared, &BIAS, y - 5.5);
     match row.variance {
-        Some(variance) => draw_estimate(drawing, axis, b, variance, &VARIANCE, y + 4.5),
-        None => drawing.text((b.right - 4.0, y + 4.0), "no variance: nothing random", 10.5, GREY, Align::Right),
+        Some(variance) => draw_estimate(drawing, axis, b, variance, &VARIANCE, y + 5.5),
+        None => drawing.text((b.right - 4.0, y + 9.5), "no variance: nothing random", 10.5, GREY, Align::Right),
     }
 }
 
@@ -165,6 +181,9 @@ fn draw_estimate(drawing: &mut Drawing, axis: &LogAxis, b: &Bounds, estimate: Es
         return;
     }
     if let Some((low, high)) = interval {
+        if low <= 0.0 {
+            arrow(drawing, axis.clamped(high), b.left + 5.0, y, style.colour);
+        }
         drawing.line(&[(axis.clamped(low), y), (axis.clamped(high), y)], 2.0, style.colour, Dash::Solid);
     }
     draw_marker(drawing, (axis.pixel(estimate.value), y), 3.8, style);

@@ -75,10 +75,27 @@ impl Rgb8 {
         write_png_rgb8(path, self.width, self.height, &self.bytes)
     }
 
-    /// Paints `marks` over the raster, `scale` pixels for one pixel of the page.
-    pub(super) fn paint(&mut self, marks: &[Mark], scale: f64) {
+    /// Paints `marks` over the raster, `scale` pixels for one pixel of the page; what they leave free keeps its bits.
+    pub(super) fn annotate(&mut self, marks: &[Mark], scale: f64) {
+        let mut large = self.enlarged(OVERSAMPLING);
+        large.paint(marks, scale * f64::from(OVERSAMPLING));
+        *self = large.shrunk(OVERSAMPLING);
+    }
+
+    /// Paints without smoothing.
+    fn paint(&mut self, marks: &[Mark], scale: f64) {
         let size = (self.width, self.height);
         paint(&BitMapBackend::with_buffer(&mut self.bytes, size).into_drawing_area(), marks, scale, &PIXEL_TEXT);
+    }
+
+    /// Each pixel becomes a square of `factor`² pixels.
+    fn enlarged(&self, factor: u32) -> Self {
+        let mut bytes = Vec::with_capacity(self.bytes.len() * (factor * factor) as usize);
+        for row in self.bytes.chunks_exact(3 * self.width as usize) {
+            let wide: Vec<u8> = row.chunks_exact(3).flat_map(|pixel| pixel.repeat(factor as usize)).collect();
+            bytes.extend(wide.repeat(factor as usize));
+        }
+        Self { width: self.width * factor, height: self.height * factor, bytes }
     }
 
     /// Each output pixel is the mean of a square of `factor`² pixels, rounded to nearest.
@@ -226,8 +243,11 @@ impl Drawing {
         Self { width: width.round(), height: height.round(), marks: Vec::new() }
     }
 
+    /// A line through at least two points; fewer leave no mark.
     pub fn line(&mut self, points: &[Place], width: f64, colour: Colour, dash: Dash) {
-        self.marks.push(Mark::Line { points: points.to_vec(), width, colour, dash });
+        if points.len() > 1 {
+            self.marks.push(Mark::Line { points: points.to_vec(), width, colour, dash });
+        }
     }
 
     pub fn area(&mut self, points: &[Place], colour: Colour, alpha: f64) {
@@ -376,19 +396,15 @@ fn paint<DB: DrawingBackend>(area: &DrawingArea<DB, Shift>, marks: &[Mark], scal
                 area.draw(&Polygon::new(points, fill)).expect(CANNOT_FAIL);
             }
             Mark::Line { points, width, colour, dash } if rules.pixels => {
-                for piece in dashes(points, dash.pattern()) {
-                    let pieces: Vec<Mark> = stroke(&piece, *width)
-                        .map(|points| Mark::Area { points, colour: *colour, alpha: 1.0 })
-                        .collect();
-                    paint(area, &pieces, scale, rules);
-                }
+                let pieces = dashes(points, dash.pattern());
+                let areas = pieces.iter().flat_map(|piece| stroke(piece, *width));
+                let areas: Vec<Mark> = areas.map(|points| Mark::Area { points, colour: *colour, alpha: 1.0 }).collect();
+                paint(area, &areas, scale, rules);
             }
-            Mark::Line { points, width, colour: [r, g, b], dash } => {
+            Mark::Line { points, width, colour: [r, g, b], .. } => {
                 let style = ShapeStyle::from(RGBAColor(*r, *g, *b, 1.0)).stroke_width((width * scale).round() as u32);
-                for piece in dashes(points, dash.pattern()) {
-                    let piece: Vec<_> = piece.into_iter().map(pixel).collect();
-                    area.draw(&PathElement::new(piece, style)).expect(CANNOT_FAIL);
-                }
+                let points: Vec<_> = points.iter().copied().map(pixel).collect();
+                area.draw(&PathElement::new(points, style)).expect(CANNOT_FAIL);
             }
             Mark::Text(text) => paint_text(area, text, scale, rules),
         }
@@ -478,11 +494,10 @@ fn distance(a: Place, b: Place) -> f64 {
     ((b.0 - a.0) * (b.0 - a.0) + (b.1 - a.1) * (b.1 - a.1)).sqrt()
 }
 
-/// What plotters leaves out of an SVG: a size in pixels apart from its units, a title, fallback fonts, and text widths,
-/// so that a wider fallback font still fits the room that was measured for it.
+/// What plotters leaves out of an SVG: a size in pixels apart from its units, a title, fallback fonts, dashes, and text
+/// widths, so that a wider fallback font still fits the room that was measured for it.
 fn finished_svg(drawing: &Drawing, body: &str, title: &str) -> String {
     let (width, height) = (drawing.width, drawing.height);
-    let body = body.split_once('\n').map_or("", |(_, rest)| rest);
     let family = format!("font-family=\"{FAMILY}\" ");
     let body = body.replace(&family, "").replace("dy=\"0.76em\" ", "").replace(" opacity=\"1\"", "");
     let mut svg = format!(
@@ -493,15 +508,38 @@ fn finished_svg(drawing: &Drawing, body: &str, title: &str) -> String {
         height * SVG_UNITS,
         escaped(title),
     );
-    let texts = drawing.marks.iter().filter_map(|mark| if let Mark::Text(text) = mark { Some(text) } else { None });
-    // plotters escapes the quotes and angle brackets of a text, so these words can only be its own tags.
-    let mut pieces = body.split("<text ");
-    svg.push_str(pieces.next().unwrap_or_default());
-    for (piece, text) in pieces.zip(texts) {
-        let length = (text_width(&text.text, text.size, text.bold) * SVG_UNITS).round();
-        svg.push_str(&format!("<text textLength=\"{length}\" lengthAdjust=\"spacingAndGlyphs\" {piece}"));
+    let texts = drawing.marks.iter().filter(|mark| matches!(mark, Mark::Text(_)));
+    let lines = drawing.marks.iter().filter(|mark| matches!(mark, Mark::Line { .. }));
+    let mut attributes = [
+        ("<text ", texts.map(extra_attribute).collect::<Vec<_>>().into_iter()),
+        ("<polyline ", lines.map(extra_attribute).collect::<Vec<_>>().into_iter()),
+    ];
+    // The first line is plotters' own <svg>. It writes one tag a line and escapes the angle brackets of texts, so a line
+    // that starts with a tag is one, and the n-th such tag belongs to the n-th such mark.
+    for line in body.lines().skip(1) {
+        let tagged =
+            attributes.iter_mut().find_map(|(tag, extra)| Some((*tag, line.strip_prefix(*tag)?, extra.next()?)));
+        match tagged {
+            Some((tag, rest, extra)) => svg.extend([tag, &extra, rest, "\n"]),
+            None => svg.extend([line, "\n"]),
+        }
     }
     svg
+}
+
+/// The attribute that plotters does not write for this mark, with a space after it; may be empty.
+fn extra_attribute(mark: &Mark) -> String {
+    match mark {
+        Mark::Text(text) => {
+            let length = (text_width(&text.text, text.size, text.bold) * SVG_UNITS).round();
+            format!("textLength=\"{length}\" lengthAdjust=\"spacingAndGlyphs\" ")
+        }
+        Mark::Line { dash, .. } if *dash != Dash::Solid => {
+            let lengths: Vec<String> = dash.pattern().iter().map(|l| (l * SVG_UNITS).round().to_string()).collect();
+            format!("stroke-dasharray=\"{}\" ", lengths.join(" "))
+        }
+        _ => String::new(),
+    }
 }
 
 fn escaped(text: &str) -> String {
@@ -571,6 +609,31 @@ mod tests {
         assert_eq!(raster.pixel(22, 22), [213, 94, 0]);
         assert_eq!(raster.pixel(12, 22), [255; 3]);
         assert_eq!(raster.pixel(33, 22), [255; 3]);
+    }
+
+    #[test]
+    fn dashes_and_widths_are_told_to_the_mark_they_belong_to() {
+        let mut drawing = Drawing::new(100.0, 50.0);
+        let line = [(0.0, 0.0), (90.0, 10.0)];
+        drawing.line(&line, 1.0, [1, 1, 1], Dash::Solid);
+        drawing.text((5.0, 20.0), "<polyline points", 12.0, [0; 3], Align::Left);
+        drawing.line(&line, 1.0, [2, 2, 2], Dash::Dotted);
+        let svg = drawing.finish("").svg;
+        let dashed: Vec<&str> = svg.lines().filter(|line| line.contains("dasharray")).collect();
+        assert_eq!(dashed.len(), 1, "{svg}");
+        assert!(dashed[0].contains("#020202") && dashed[0].contains("\"18 26\""), "{svg}");
+    }
+
+    #[test]
+    fn annotating_a_raster_keeps_the_pixels_beside_the_letters() {
+        let mut raster = Rgb8::filled(60, 40, [10, 20, 30]);
+        raster.set(3, 4, [200, 0, 7]);
+        let mut drawing = Drawing::new(0.0, 0.0);
+        drawing.text((10.0, 30.0), "ld", 12.0, [255; 3], Align::Left);
+        let before = raster.clone();
+        raster.annotate(&drawing.marks, 1.0);
+        assert_ne!(raster, before);
+        assert_eq!(raster.bytes[..3 * 60 * 15], before.bytes[..3 * 60 * 15]);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::axis::{LogAxis, number_label};
 use super::figure::{Align, Bounds, Dash, Drawing, Figure, PAGE_WIDTH, Place, Text, shortened, text_width};
-use super::labels::{first_free, kept_apart};
+use super::labels::kept_apart;
 use super::plots::{Frame, Header, KEY, LeftOut, SMALL, TICK, TITLE};
 use super::style::{GREY, GRID, INK, PALE, Style, draw_key, draw_marker, lightened, style_of};
 
@@ -53,6 +53,10 @@ pub fn pareto_front(trials: &[(f64, f64)]) -> Vec<usize> {
 /// The front is that of the medians. Trials whose seconds or error are not above 0 or not finite are left out and
 /// counted under the subtitle.
 pub fn pareto_chart(frame: &Frame, trials: &[Trial]) -> Figure {
+    drawn(frame, trials).finish(&frame.title)
+}
+
+fn drawn(frame: &Frame, trials: &[Trial]) -> Drawing {
     let mut left_out = LeftOut::default();
     let trials: Vec<Trial> =
         trials.iter().filter(|trial| left_out.admits(&[trial.seconds, trial.error])).map(cleaned).collect();
@@ -72,7 +76,7 @@ pub fn pareto_chart(frame: &Frame, trials: &[Trial]) -> Figure {
     chart.draw_frame(&mut drawing, frame);
     draw_legend(&mut drawing, &labels, (bounds.right + 16.0, bounds.top + 8.0), widest);
     chart.draw(&mut drawing);
-    drawing.finish(&frame.title)
+    drawing
 }
 
 /// The trial without intervals that cannot be drawn.
@@ -130,11 +134,15 @@ fn axis_of(values: &[(f64, Option<(f64, f64)>)], from: f64, to: f64) -> LogAxis 
 }
 
 impl<'a> Chart<'a> {
+    /// Leaves room for names at the left, and below where the names run over the bottom.
     fn new(trials: &'a [Trial], b: Bounds) -> Self {
         let front = pareto_front(&trials.iter().map(|t| (t.seconds, t.error)).collect::<Vec<_>>());
         let seconds: Vec<_> = trials.iter().map(|t| (t.seconds, t.seconds_interval)).collect();
         let errors: Vec<_> = trials.iter().map(|t| (t.error, t.error_interval)).collect();
-        Self { trials, front, x: axis_of(&seconds, b.left, b.right), y: axis_of(&errors, b.bottom, b.top), b }
+        let widest = front.iter().map(|&i| text_width(&name(&trials[i]), NAME, false)).fold(0.0, f64::max);
+        let x = axis_of(&seconds, b.left + widest.min(0.4 * (b.right - b.left)), b.right);
+        let y = axis_of(&errors, b.bottom - NAME_STEP, b.top);
+        Self { trials, front, x, y, b }
     }
 
     fn place(&self, trial: &Trial) -> Place {
@@ -218,42 +226,67 @@ impl<'a> Chart<'a> {
         drawing.line(&steps, 1.6, INK, Dash::Solid);
     }
 
-    /// Names the members of the front; by its definition the region below and left of it is empty, so names stand there.
+    /// Names the members of the front. Below and left of it nothing stands, by its definition: each name goes there, right
+    /// of nothing but its own marker, as high as the names before it allow; so no name or leader crosses another.
     fn draw_names(&self, drawing: &mut Drawing) {
-        const SIZE: f64 = 11.0;
-        let marker = |t: &Trial| {
-            let (x, y) = self.place(t);
-            Bounds { left: x - 6.0, top: y - 6.0, right: x + 6.0, bottom: y + 6.0 }
-        };
-        let mut taken: Vec<Bounds> = self.trials.iter().map(marker).collect();
-        for trial in self.front.iter().map(|&i| &self.trials[i]) {
-            let (x, y) = self.place(trial);
-            let name = format!("{} @ {}", trial.label, trial.detail);
-            let text = |at: Place| Text {
-                at,
-                text: name.clone(),
-                size: SIZE,
+        let names: Vec<String> = self.front.iter().map(|&i| name(&self.trials[i])).collect();
+        for ((&i, name), baseline) in self.front.iter().zip(names).zip(self.baselines()) {
+            let (x, y) = self.place(&self.trials[i]);
+            let reach = |t: &Trial| t.seconds_interval.map_or(t.seconds, |(low, _)| low.min(t.seconds));
+            let in_the_way = self.trials.iter().filter(|t| {
+                let (top, bottom) = self.rows(t);
+                top < baseline + 4.0 && bottom > baseline - NAME
+            });
+            let right =
+                in_the_way.map(|t| self.x.clamped(reach(t)).min(self.place(t).0 - 7.0)).fold(x - 7.0, f64::min) - 3.0;
+            let text = Text {
+                at: (right.max(self.b.left + 4.0 + text_width(&name, NAME, false)), baseline),
+                text: name,
+                size: NAME,
                 bold: false,
                 colour: INK,
                 align: Align::Right,
                 turned: false,
             };
-            let offsets = (0..14).flat_map(|ring| {
-                let r = 9.0 + 12.0 * f64::from(ring);
-                [(-r, 0.35 * r + 4.0), (-0.6 * r, 0.8 * r + 6.0), (-r, 4.0), (-0.2 * r, r + 8.0)]
-            });
-            let candidates = offsets.map(|(dx, dy)| (x + dx, y + dy)).map(|at| (text(at).bounds(), at));
-            if let Some((bounds, at)) = first_free(candidates, &self.b, &taken) {
-                let tip = (bounds.right + 1.0, (bounds.top + bounds.bottom) / 2.0);
-                if (tip.0 - x).abs() + (tip.1 - y).abs() > 22.0 {
-                    drawing.line(&[tip, (x, y)], 0.8, PALE, Dash::Solid);
-                    draw_marker(drawing, (x, y), 4.2, &trial.style);
-                }
-                taken.push(bounds);
-                drawing.add_text(text(at));
+            if baseline - y > NAME + 4.0 {
+                drawing.line(&[(text.at.0 + 2.0, baseline - 4.0), (x, y + 6.0)], 0.8, PALE, Dash::Solid);
             }
+            drawing.add_text(text);
         }
     }
+
+    /// First and last row of pixels that a trial's marker and vertical bar take.
+    fn rows(&self, trial: &Trial) -> (f64, f64) {
+        let y = self.place(trial).1;
+        let (low, high) = trial.error_interval.unwrap_or((trial.error, trial.error));
+        (self.y.clamped(high).min(y - 6.0), self.y.clamped(low).max(y + 6.0))
+    }
+
+    /// Baselines of the front's names: each just below its marker or below the name before it; at the bottom moved up
+    /// as far as needed.
+    fn baselines(&self) -> Vec<f64> {
+        let mut next = f64::NEG_INFINITY;
+        let mut baselines: Vec<f64> = Vec::new();
+        for &i in &self.front {
+            let y = (self.place(&self.trials[i]).1 + NAME + 2.0).max(next);
+            baselines.push(y);
+            next = y + NAME_STEP;
+        }
+        let mut limit = self.b.bottom - 5.0;
+        for y in baselines.iter_mut().rev() {
+            *y = y.min(limit);
+            limit = *y - NAME_STEP;
+        }
+        baselines
+    }
+}
+
+/// Size of a name in pixels, and from one name's line to the next.
+const NAME: f64 = 11.0;
+const NAME_STEP: f64 = 12.5;
+
+fn name(trial: &Trial) -> String {
+    format!("{} @ {}", trial.label, trial.detail)
 }
 
 #[cfg(test)]

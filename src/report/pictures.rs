@@ -207,7 +207,7 @@ impl<'a> Grid<'a> {
         if let Some(bar) = &self.layout.scale_bar {
             self.draw_bar(&mut raster, &mut texts, bar, rows * self.cell_height());
         }
-        raster.paint(&texts.marks, self.scale);
+        raster.annotate(&texts.marks, self.scale);
         raster
     }
 

@@ -100,6 +100,10 @@ const WARNING: Colour = [166, 64, 0];
 /// Values that are not above 0 or not finite are left out and counted under the subtitle; without any value left the
 /// figure says "no data".
 pub fn loglog_chart(frame: &Frame, plot: &Plot) -> Figure {
+    drawn_large(frame, plot).finish(&frame.title)
+}
+
+fn drawn_large(frame: &Frame, plot: &Plot) -> Drawing {
     let (plot, left_out) = showable(plot);
     let axes = Axes::of(frame, std::slice::from_ref(&plot));
     let header = Header::new(frame, &[left_out.note(), axes.floor_note(&plot)]);
@@ -120,12 +124,16 @@ pub fn loglog_chart(frame: &Frame, plot: &Plot) -> Figure {
     let mut column = panel.draw_helpers(&mut drawing, &plot, true);
     column.extend(panel.draw_lines(&mut drawing, &plot));
     draw_column(&mut drawing, &bounds, &column, widest);
-    drawing.finish(&frame.title)
+    drawing
 }
 
 /// Several plots side by side, `columns` in a row, under the same axes and one legend; series of the same label are
 /// taken to look the same.
 pub fn small_multiples(frame: &Frame, plots: &[Plot], columns: usize) -> Figure {
+    drawn_grid(frame, plots, columns).finish(&frame.title)
+}
+
+fn drawn_grid(frame: &Frame, plots: &[Plot], columns: usize) -> Drawing {
     let (plots, left_out): (Vec<Plot>, Vec<LeftOut>) = plots.iter().map(showable).unzip();
     let columns = columns.clamp(1, plots.len().max(1));
     let rows = plots.len().max(1).div_ceil(columns);
@@ -171,7 +179,7 @@ pub fn small_multiples(frame: &Frame, plots: &[Plot], columns: usize) -> Figure 
     }
     axes.draw_names(&mut drawing, &all);
     legend.draw(&mut drawing, axes.left_margin(), all.bottom + foot);
-    drawing.finish(&frame.title)
+    drawing
 }
 
 /// How many points a logarithm cannot show.

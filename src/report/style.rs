@@ -86,18 +86,17 @@ pub(super) fn lightened(colour: Colour, share: f64) -> Colour {
 
 /// Draws the style's marker; `radius` is that of the disk, other shapes are scaled to look as large.
 pub(super) fn draw_marker(drawing: &mut Drawing, at: Place, radius: f64, style: &Style) {
-    let outline = outline(at, radius, style.marker);
     // A white rim sets a marker off from the lines below it.
-    let mut rim = outline.clone();
-    rim.extend_from_slice(&outline[..2]);
-    drawing.line(&rim, 2.6, WHITE, Dash::Solid);
-    drawing.area(&outline, if style.filled { style.colour } else { WHITE }, 1.0);
-    drawing.line(&rim, 1.3, style.colour, Dash::Solid);
+    drawing.area(&outline(at, radius + 1.9, style.marker), WHITE, 1.0);
+    drawing.area(&outline(at, radius + 0.7, style.marker), style.colour, 1.0);
+    if !style.filled {
+        drawing.area(&outline(at, radius - 0.9, style.marker), WHITE, 1.0);
+    }
 }
 
 fn outline(at: Place, radius: f64, marker: Marker) -> Vec<Place> {
     match marker {
-        Marker::Circle => regular(at, radius, 20, 0.0),
+        Marker::Circle => regular(at, radius, 16, 0.0),
         Marker::Square => regular(at, 1.25 * radius, 4, 0.125),
         Marker::TriangleUp => regular((at.0, at.1 + 0.2 * radius), 1.35 * radius, 3, 0.0),
         Marker::TriangleDown => regular((at.0, at.1 - 0.2 * radius), 1.35 * radius, 3, 0.5),
