@@ -1,2 +1,3 @@
 //! Scenes: config files, meshes, camera, lights.
+pub mod config;
 pub mod json;
