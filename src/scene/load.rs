@@ -3,6 +3,7 @@
 //! Nothing is written and nothing printed; what a person should know comes back as warnings.
 
 use std::collections::HashMap;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec2, Vec3};
@@ -332,15 +333,14 @@ fn open_libraries(
 
 /// Hands the checked text to tobj. Polygons stay whole: tobj would cut them into fans, which is wrong where they are concave.
 fn read_geometry(checked: &CheckedObj, name: &str) -> Result<Vec<tobj::Model>> {
-    let mut text = b"mtllib declared\n".to_vec();
-    text.extend_from_slice(&checked.text);
     let options = tobj::LoadOptions { single_index: true, ..tobj::LoadOptions::default() };
     let declared = |_: &Path| {
         let names = (0..checked.materials.len()).map(obj::tobj_name);
         let materials = names.clone().map(|name| tobj::Material { name, ..Default::default() }).collect();
         Ok((materials, names.enumerate().map(|(i, name)| (name, i)).collect()))
     };
-    let (models, _) = tobj::load_obj_buf(&mut text.as_slice(), &options, declared)
+    let mut text = b"mtllib declared\n".chain(checked.text.as_slice());
+    let (models, _) = tobj::load_obj_buf(&mut text, &options, declared)
         .map_err(|e| Error::input(name, format!("expected a mesh that tobj reads, found: {e}")))?;
     Ok(models)
 }
@@ -371,10 +371,17 @@ fn append_faces(from: &tobj::Mesh, to: &mut Mesh, told: &mut Told) {
     let uv = |i: u32| {
         if from.texcoords.is_empty() { Vec2::ZERO } else { Vec2::from_slice(&from.texcoords[2 * i as usize..]) }
     };
+    // A polygon of n corners makes n - 2 triangles; no arities means triangles throughout.
+    let triangles = match from.face_arities.len() {
+        0 => from.indices.len() / 3,
+        polygons => from.indices.len() - 2 * polygons,
+    };
+    to.positions.reserve(triangles);
+    to.normals.reserve(triangles);
+    to.uvs.reserve(triangles);
     let mut left = from.indices.as_slice();
     let mut arities = from.face_arities.iter();
     while !left.is_empty() {
-        // No arities means triangles throughout.
         let (face, rest) = left.split_at(arities.next().map_or(3, |&n| n as usize));
         left = rest;
         let start = fan_start(face, corner, told);

@@ -160,41 +160,35 @@ impl<L: FnMut(&str, &str) -> Result<Vec<MtlMaterial>>> Pass<'_, L> {
         }
     }
 
-    /// Copies the first `n` words of a checked line.
-    fn copy(&mut self, keyword: &str, rest: &[u8], n: usize) {
+    /// Copies a checked line.
+    fn copy(&mut self, keyword: &str, numbers: &[u8]) {
         self.out.text.extend_from_slice(keyword.as_bytes());
-        for word in words(rest).take(n) {
-            self.out.text.push(b' ');
-            self.out.text.extend_from_slice(word);
-        }
+        self.out.text.extend_from_slice(numbers);
         self.out.text.push(b'\n');
     }
 
-    /// Checks that the words are finite numbers, `least` to `most` of them, and returns their count.
-    fn numbers(&self, rest: &[u8], least: usize, most: usize, expected: &str) -> Result<usize> {
-        let mut n = 0;
-        for word in words(rest) {
-            n += 1;
-            if !is_number(word) {
-                return Err(self.error(expected, format!("{:?}", shorten(&String::from_utf8_lossy(word)))));
-            }
+    /// Checks that the words are finite numbers, `least` to `most` of them; returns their count, and the text without comment.
+    fn numbers<'t>(&self, rest: &'t [u8], least: usize, most: usize, expected: &str) -> Result<(usize, &'t [u8])> {
+        if let Some(n) = plain_numbers(rest).filter(|n| (least..=most).contains(n)) {
+            return Ok((n, rest));
         }
-        if n < least || n > most {
-            return Err(self.error(expected, format!("{n} numbers")));
+        let rest = without_comment(rest);
+        if let Some(word) = words(rest).find(|word| !number(word).is_some_and(f32::is_finite)) {
+            return Err(self.error(expected, format!("{:?}", shorten(&String::from_utf8_lossy(word)))));
         }
-        Ok(n)
+        match words(rest).count() {
+            n if n < least || n > most => Err(self.error(expected, format!("{n} numbers"))),
+            n => Ok((n, rest)),
+        }
     }
 
     fn position(&mut self, rest: &[u8]) -> Result<()> {
         const EXPECTED: &str = "v with 3 finite coordinates (or 4 with a weight, or 6 with a colour)";
-        let rest = without_comment(rest);
-        // A colour, with or without alpha, is not used: tobj wants it on all vertices or on none.
-        let copied = match self.numbers(rest, 3, 7, EXPECTED)? {
-            4 => 4,
-            5 => return Err(self.error(EXPECTED, "5 numbers")),
-            _ => 3,
-        };
-        if copied == 4 {
+        let (n, rest) = self.numbers(rest, 3, 7, EXPECTED)?;
+        if n == 5 {
+            return Err(self.error(EXPECTED, "5 numbers"));
+        }
+        if n == 4 {
             let mut numbers = words(rest).map(number);
             let xyz: Vec<f32> = numbers.by_ref().take(3).flatten().collect();
             let weight = numbers.next().flatten().unwrap_or(0.0);
@@ -202,16 +196,16 @@ impl<L: FnMut(&str, &str) -> Result<Vec<MtlMaterial>>> Pass<'_, L> {
                 return Err(self.error("a weight that leaves the coordinates finite", weight));
             }
         }
+        // A colour, with or without alpha, is not used: tobj wants it on all vertices or on none.
         self.counts[0] += 1;
-        self.copy("v", rest, copied);
+        self.copy("v", if n > 4 { first_words(rest, 3) } else { rest });
         Ok(())
     }
 
     fn texture_coordinates(&mut self, rest: &[u8]) -> Result<()> {
-        let rest = without_comment(rest);
-        let n = self.numbers(rest, 1, 3, "vt with 1 to 3 finite numbers")?;
+        let (n, rest) = self.numbers(rest, 1, 3, "vt with 1 to 3 finite numbers")?;
         self.counts[1] += 1;
-        self.copy("vt", rest, 2);
+        self.copy("vt", rest);
         if n == 1 {
             // The format's own default for the second coordinate; tobj asks for it in writing.
             self.out.text.pop();
@@ -221,48 +215,50 @@ impl<L: FnMut(&str, &str) -> Result<Vec<MtlMaterial>>> Pass<'_, L> {
     }
 
     fn normal(&mut self, rest: &[u8]) -> Result<()> {
-        let rest = without_comment(rest);
-        self.numbers(rest, 3, 3, "vn with 3 finite numbers")?;
+        let (_, rest) = self.numbers(rest, 3, 3, "vn with 3 finite numbers")?;
         self.counts[2] += 1;
-        self.copy("vn", rest, 3);
+        self.copy("vn", rest);
         Ok(())
     }
 
     fn face(&mut self, rest: &[u8]) -> Result<()> {
-        let rest = without_comment(rest);
-        let mut form: Option<[bool; 2]> = None;
-        let mut corners = 0;
-        for word in words(rest) {
-            let found = self.corner(word)?;
-            if form.is_some_and(|first| first != found) {
-                let words = String::from_utf8_lossy(rest);
-                let what = "corners of one form (all v, all v/vt, all v//vn or all v/vt/vn)";
-                return Err(self.error(what, format!("{:?}", shorten(words.trim()))));
-            }
-            form = Some(found);
-            corners += 1;
-        }
-        if corners < 3 {
-            return Err(self.error("a face of at least 3 corners", corners));
-        }
-        if self.form != form {
+        let (form, rest) = match plain_face(rest, self.counts) {
+            Some(form) => (form, rest),
+            None => self.any_face(rest)?,
+        };
+        if self.form != Some(form) {
             // An empty group: the faces before stay together, in the form that they share.
             self.out.text.extend_from_slice(b"g\n");
-            self.form = form;
+            self.form = Some(form);
         }
         if !self.has_material && self.out.first_bare_face.is_none() {
             self.out.first_bare_face = Some(self.line);
         }
         self.faces += 1;
-        self.copy("f", rest, corners);
+        self.copy("f", rest);
         Ok(())
+    }
+
+    /// Checks a face, and returns its form and its text without comment.
+    fn any_face<'t>(&self, rest: &'t [u8]) -> Result<([bool; 2], &'t [u8])> {
+        let rest = without_comment(rest);
+        let forms: Vec<[bool; 2]> = words(rest).map(|word| self.corner(word)).collect::<Result<_>>()?;
+        if forms.len() < 3 {
+            return Err(self.error("a face of at least 3 corners", forms.len()));
+        }
+        if forms.iter().any(|form| *form != forms[0]) {
+            let words = String::from_utf8_lossy(rest);
+            let what = "corners of one form (all v, all v/vt, all v//vn or all v/vt/vn)";
+            return Err(self.error(what, format!("{:?}", shorten(words.trim()))));
+        }
+        Ok((forms[0], rest))
     }
 
     /// Checks one corner `v`, `v/vt`, `v//vn` or `v/vt/vn`, and says which of vt and vn it has.
     fn corner(&self, word: &[u8]) -> Result<[bool; 2]> {
         let mut has = [false; 3];
         for (i, part) in word.split(|&b| b == b'/').enumerate() {
-            if part.is_empty() && i > 0 && i < 3 {
+            if part.is_empty() && (1..3).contains(&i) {
                 continue;
             }
             let index = if i < 3 { index(part) } else { None };
@@ -462,22 +458,102 @@ fn split_keyword(line: &[u8]) -> (&[u8], &[u8]) {
     line.split_at(end)
 }
 
-fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
-    text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+fn words(text: &[u8]) -> Words<'_> {
+    Words { left: text }
+}
+
+/// The words of a text between ASCII white space.
+struct Words<'a> {
+    left: &'a [u8],
+}
+
+impl<'a> Iterator for Words<'a> {
+    type Item = &'a [u8];
+
+    fn next(&mut self) -> Option<&'a [u8]> {
+        let start = self.left.iter().position(|b| !b.is_ascii_whitespace())?;
+        let left = &self.left[start..];
+        let end = left.iter().position(u8::is_ascii_whitespace).unwrap_or(left.len());
+        let (word, left) = left.split_at(end);
+        self.left = left;
+        Some(word)
+    }
+}
+
+/// The text up to the end of its `n`th word.
+fn first_words(text: &[u8], n: usize) -> &[u8] {
+    let mut words = words(text);
+    words.by_ref().take(n).for_each(drop);
+    &text[..text.len() - words.left.len()]
 }
 
 /// The text up to a `#`, which starts a comment among numbers (in names it is a letter).
 fn without_comment(text: &[u8]) -> &[u8] {
-    text.iter().position(|&b| b == b'#').map_or(text, |end| &text[..end])
+    text.iter().position(|&b| b == b'#').map_or(text, |end| text[..end].trim_ascii_end())
 }
 
-/// Whether the word is a number that is finite as `f32`.
-fn is_number(word: &[u8]) -> bool {
-    // Nearly all are digits and a point, too short to overflow: no need to work out their value here.
-    let digits = word.strip_prefix(b"-").unwrap_or(word);
-    let points = digits.iter().filter(|&&b| b == b'.').count();
-    let is_plain = digits.iter().all(|&b| b.is_ascii_digit() || b == b'.') && points <= 1 && digits.len() > points;
-    (is_plain && digits.len() <= 30) || number(word).is_some_and(f32::is_finite)
+/// The count of numbers, where they are nothing but digits, points and signs, too short to overflow `f32`; `None` where
+/// their values need a closer look. Nearly all lines of a mesh end here.
+fn plain_numbers(text: &[u8]) -> Option<usize> {
+    let mut n = 0;
+    let (mut length, mut digits, mut points) = (0, 0, 0);
+    for &b in text.iter().chain(b" ") {
+        match b {
+            b'0'..=b'9' => digits += 1,
+            b'.' => points += 1,
+            b'-' if length == 0 => {}
+            b' ' | b'\t' if length == 0 => continue,
+            b' ' | b'\t' if (1..=30).contains(&digits) && points <= 1 => {
+                n += 1;
+                (length, digits, points) = (0, 0, 0);
+                continue;
+            }
+            _ => return None,
+        }
+        length += 1;
+    }
+    Some(n)
+}
+
+/// The form of a face of at least 3 corners of one form, whose indices are positive and within `counts`; `None` for any
+/// other text, which needs a closer look. Nearly all faces of a mesh end here.
+fn plain_face(text: &[u8], counts: [u32; 3]) -> Option<[bool; 2]> {
+    let mut form = None;
+    let mut corners = 0;
+    let mut has = [false; 3];
+    let (mut part, mut value, mut digits) = (0, 0u64, 0);
+    for &b in text.iter().chain(b" ") {
+        match b {
+            b'0'..=b'9' => {
+                // Saturated, it is out of range whatever the count.
+                value = value.saturating_mul(10).saturating_add(u64::from(b - b'0'));
+                digits += 1;
+                continue;
+            }
+            b' ' | b'\t' if part == 0 && digits == 0 => continue,
+            b'/' | b' ' | b'\t' => {}
+            _ => return None,
+        }
+        if (digits > 0 && !(1..=u64::from(counts[part])).contains(&value)) || (digits == 0 && part == 0) {
+            return None;
+        }
+        has[part] = digits > 0;
+        (value, digits) = (0, 0);
+        part += 1;
+        if b == b'/' {
+            if part == 3 {
+                return None;
+            }
+            continue;
+        }
+        let found = [has[1], has[2]];
+        if *form.get_or_insert(found) != found {
+            return None;
+        }
+        (part, has) = (0, [false; 3]);
+        corners += 1;
+    }
+    if corners >= 3 { form } else { None }
 }
 
 /// The word as `f32`; may be infinite or NaN.
@@ -525,16 +601,35 @@ mod tests {
     }
 
     #[test]
-    fn the_quick_look_at_a_number_agrees_with_working_it_out() {
-        let trouble = prop_oneof![
-            "[-+.0-9eE]{0,9}",
-            "-?[0-9]{25,45}(\\.[0-9]{0,3})?",
-            "-?(nan|inf|infinity)",
-            any::<f32>().prop_map(|x| x.to_string())
+    fn the_quick_look_at_numbers_agrees_with_working_them_out() {
+        let word =
+            prop_oneof!["[-.0-9]{0,6}", "-?[0-9]{25,45}", "-?[0-9]{1,4}\\.[0-9]{0,6}", "[+eE0-9]{1,4}", "nan|inf|#1"];
+        run(&prop::collection::vec((word, "[ \t]{1,2}"), 0..5), |words| {
+            let text: String = words.iter().map(|(word, blank)| format!("{word}{blank}")).collect();
+            let slow: Vec<bool> = text.split_whitespace().map(|w| w.parse::<f32>().is_ok_and(f32::is_finite)).collect();
+            if let Some(n) = plain_numbers(text.as_bytes()) {
+                assert_eq!(vec![true; n], slow, "{text:?}");
+            }
+        });
+        assert_eq!(plain_numbers(b" -1.5 0.25\t100 "), Some(3));
+        assert_eq!(plain_numbers(b""), Some(0));
+    }
+
+    #[test]
+    fn the_quick_look_at_faces_agrees_with_the_slow_one() {
+        let word = prop_oneof!["[1-9]", "[0-9]/[0-9]", "[1-3]//[1-3]", "[1-3]/[1-3]/[1-3]", "-?[0-9/#]{1,4}", "[1-3]/"];
+        let faces = prop_oneof![
+            prop::collection::vec(word.clone(), 0..5),
+            (word, 1..5usize).prop_map(|(word, n)| vec![word; n]),
         ];
-        run(&trouble, |word| {
-            let slow = word.parse::<f32>().is_ok_and(f32::is_finite);
-            assert_eq!(is_number(word.as_bytes()), slow, "{word:?}");
+        run(&faces, |words| {
+            let text = words.join(" ");
+            let counts = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 1\nvn 0 0 1\nvn 0 1 0\nvn 1 0 0\n";
+            let slow = check_obj(format!("{counts}f {text} #\n").as_bytes(), "a", |_, _| Ok(Vec::new()));
+            let fast = plain_face(text.as_bytes(), [3, 2, 3]);
+            let is_plain = !text.contains(['-', '#']);
+            assert!(fast.is_none() || slow.is_ok(), "{text:?} passed");
+            assert!(slow.is_err() || fast.is_some() || !is_plain, "{text:?} was left to the slow way");
         });
     }
 
