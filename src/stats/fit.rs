@@ -2,6 +2,7 @@
 
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::Rng;
+use serde::{Deserialize, Serialize};
 
 use super::moments::{student_t_quantile, sum};
 use super::special::normal_upper_tail;
@@ -49,7 +50,8 @@ fn line(x: &[f64], y: &[f64]) -> Option<LineFit> {
 }
 
 /// What an interval of a slope was made from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum IntervalKind {
     /// Replicates resampled at each n: how far another set of replicates would move the slope.
     Bootstrap,
@@ -59,7 +61,7 @@ pub enum IntervalKind {
 }
 
 /// The slope of RMSE in n, with its interval.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SlopeFit {
     /// Slope of ln RMSE against ln n; −0.5 for independent samples.
     pub slope: f64,

@@ -50,6 +50,21 @@ impl L2Kind {
         Self::Diaphony,
     ];
 
+    /// The name under which results are recorded.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Star => "l2_star",
+            Self::Extreme => "extreme_l2",
+            Self::Centred => "centred_l2",
+            Self::Mixture => "mixture_l2",
+            Self::Modified => "modified_l2",
+            Self::Symmetric => "symmetric_l2",
+            Self::WrapAround => "wrap_around_l2",
+            Self::Periodic => "periodic_l2",
+            Self::Diaphony => "diaphony",
+        }
+    }
+
     /// E[D²] of n independent uniform points in d dimensions: (K̄^d − c^d)/n with K̄ the mean of K(x, x).
     ///
     /// The mean of squared discrepancies; the mean of their roots is smaller (Jensen).
@@ -229,7 +244,7 @@ impl Double {
     /// a · b exactly, by the fused multiply-add (one rounding by definition, on every machine).
     fn product(a: f64, b: f64) -> Self {
         let high = a * b;
-        Self { high, low: a.mul_add(b, -high) }
+        Self { high, low: libm::fma(a, b, -high) }
     }
 
     fn ratio(numerator: f64, denominator: f64) -> Self {

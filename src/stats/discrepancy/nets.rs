@@ -88,14 +88,9 @@ fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::testing::runner;
     use super::*;
     use proptest::prelude::*;
-    use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
-
-    fn runner(cases: u32) -> TestRunner {
-        let config = Config { cases, failure_persistence: None, ..Config::default() };
-        TestRunner::new_with_rng(config, TestRng::from_seed(RngAlgorithm::ChaCha, &[3; 32]))
-    }
 
     fn plane(points: &[[f64; 2]]) -> Points {
         Points::new_2d(points).expect("in the unit square")

@@ -7,10 +7,17 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
 use super::Points;
 
+/// Boxes that are looked at without asking twice: about ten seconds in the plane (10⁵ points), two
+/// minutes above it.
+pub const STAR_COST_LIMIT: f64 = 1e10;
+
 /// How points on the far faces of the box count.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Side {
     /// Not at all: the box [0, q) holds too few points for its volume.
     Open,
@@ -19,7 +26,7 @@ pub enum Side {
 }
 
 /// A star discrepancy with its certificate: anyone can count the box again.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Star {
     /// D*, in (0, 1].
     pub value: f64,
@@ -52,7 +59,7 @@ impl std::error::Error for CostTooHigh {}
 
 /// Boxes that [`star`] looks at: Π over axes of (distinct coordinates + 1), at most (n + 1)^d.
 ///
-/// A box of the plane costs about a nanosecond, of higher dimensions a few.
+/// A box costs about a nanosecond in the plane and ten above it.
 pub fn star_cost(points: &Points) -> f64 {
     if points.dimension() == 1 {
         return points.n() as f64;
@@ -60,7 +67,8 @@ pub fn star_cost(points: &Points) -> f64 {
     (0..points.dimension()).map(|k| grid(&points.axis(k)).len() as f64).product()
 }
 
-/// Exact star discrepancy in any dimension by enumeration, if it takes at most `limit` boxes (see [`star_cost`]).
+/// Exact star discrepancy in any dimension by enumeration, if it takes at most `limit` boxes (see
+/// [`star_cost`] and [`STAR_COST_LIMIT`]).
 ///
 /// O(n log n) in one dimension, O(n²) in two, O(n^d) above: the problem is NP-hard in d.
 ///
@@ -248,14 +256,9 @@ impl Walk<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::testing::runner;
     use super::*;
     use proptest::prelude::*;
-    use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
-
-    fn runner(cases: u32) -> TestRunner {
-        let config = Config { cases, failure_persistence: None, ..Config::default() };
-        TestRunner::new_with_rng(config, TestRng::from_seed(RngAlgorithm::ChaCha, &[1; 32]))
-    }
 
     /// Ties, both ends of the interval, neighbouring floats and ordinary numbers.
     fn coordinate() -> impl Strategy<Value = f64> {
