@@ -1,4 +1,5 @@
-//! The measures and statistics of `sampler_lab::stats` against reference values made elsewhere (`tests/reference/`, its README).
+//! The measures and statistics of `sampler_lab::stats` against reference values made elsewhere (`tests/reference/`,
+//! its README).
 
 use sampler_lab::stats::discrepancy::{
     L2Kind, Points, Side, Star, l2_root, l2_squared, min_toroidal_distance, star, star_2d, t_value,
@@ -225,7 +226,8 @@ fn every_prefix_meets_its_exact_star_discrepancy() {
     }
 }
 
-/// Halton & Zaremba 1969, Vilenkin 1967; Hinrichs, Kritzinger & Pillichshammer: formulas for any m, here to 4096 points.
+/// Halton & Zaremba 1969, Vilenkin 1967; Hinrichs, Kritzinger & Pillichshammer: formulas for any m, here to 4096
+/// points.
 #[test]
 fn hammersley_sets_meet_their_closed_forms() {
     let close = |ours: f64, truth: f64, relative: f64, what: &str, m: u32| {

@@ -41,7 +41,8 @@ impl Family {
     }
 }
 
-/// Šidák's level of one of `tests` tests, 1 − (1 − α)^(1/tests), by way of expm1 and log1p so that it never rounds to 0.
+/// Šidák's level of one of `tests` tests, 1 − (1 − α)^(1/tests), by way of expm1 and log1p so that it never rounds to
+/// 0.
 pub fn sidak(alpha: f64, tests: u32) -> f64 {
     -libm::expm1(libm::log1p(-alpha) / f64::from(tests))
 }
@@ -315,7 +316,8 @@ fn ranked(p_values: &[f64]) -> Result<Vec<usize>> {
     Ok(order)
 }
 
-/// Holm's adjusted p-values, in input order: max over j ≤ i of min(1, (N − j + 1) p_(j)). Controls the family-wise rate.
+/// Holm's adjusted p-values, in input order: max over j ≤ i of min(1, (N − j + 1) p_(j)). Controls the family-wise
+/// rate.
 ///
 /// # Errors
 /// A value that is NaN or outside [0, 1].
@@ -329,7 +331,8 @@ pub fn holm(p_values: &[f64]) -> Result<Vec<f64>> {
     Ok(adjusted)
 }
 
-/// Benjamini and Hochberg's adjusted p-values, in input order: min over j ≥ i of min(1, N p_(j)/j). Controls the share of false finds.
+/// Benjamini and Hochberg's adjusted p-values, in input order: min over j ≥ i of min(1, N p_(j)/j). Controls the
+/// share of false finds.
 ///
 /// # Errors
 /// A value that is NaN or outside [0, 1].
@@ -511,8 +514,8 @@ mod tests {
         assert_eq!(clopper_pearson(0, 0, 0.95), [0.0, 1.0]);
     }
 
-    /// A weakness shown: on rare binary pixels Welch's p-values fall below 1e-4 in 1.2 % of null runs (METHODS §0,
-    /// measured 0.0116), a hundred times too often; means over tiles of 64 pixels, 16 replicates a side, behave.
+    /// A weakness shown: on rare binary pixels Welch's p-values fall below 1e-4 in 1.2 % of null runs
+    /// (0.0116 in `failures_measured.json`), a hundred times too often; means over tiles of 64 pixels, 16 replicates a side, behave.
     /// 20 000 runs: standard error 7.6e-4 at 0.0116 and 7e-5 at 1e-4; the bounds are six of them.
     #[test]
     fn welch_cries_wolf_on_rare_binary_pixels_and_not_on_pooled_tiles() {

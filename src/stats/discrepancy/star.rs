@@ -145,9 +145,9 @@ pub fn star_1d(points: &Points) -> Star {
 
 /// Exact star discrepancy in the plane, in O(n²) time and O(n) memory.
 ///
-/// The corner sweeps in x over the distinct abscissae. `below[j]` counts the points swept so far that lie below the j-th
-/// ordinate; every point adds one to a suffix. Points of equal x enter together: the open box is looked at before they do,
-/// the closed one after.
+/// The corner sweeps in x over the distinct abscissae. `below[j]` counts the points swept so far that lie below the
+/// j-th ordinate; every point adds one to a suffix. Points of equal x enter together: the open box is looked at
+/// before they do, the closed one after.
 ///
 /// # Panics
 /// Where the points are not two-dimensional.
@@ -353,7 +353,7 @@ mod tests {
             .expect("invariant");
     }
 
-    /// One point p: max(p_1, …, p_d, 1 − Π p) (METHODS §1).
+    /// One point p: max(p_1, …, p_d, 1 − Π p), by the critical grid's few boxes.
     #[test]
     fn one_point_meets_its_closed_form() {
         for point in [[0.25, 0.75, 0.5], [0.9, 0.95, 0.99], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [1.0, 0.5, 0.0]] {
@@ -380,7 +380,7 @@ mod tests {
         }
     }
 
-    /// k × k cell centres: 1/k − 1/(4k²) (METHODS §1, exact).
+    /// k × k cell centres: 1/k − 1/(4k²) = 1 − (1 − 1/(2k))², the closed box at the last centre.
     #[test]
     fn a_grid_of_cell_centres_meets_its_closed_form() {
         for k in [1_u32, 2, 3, 5, 16, 33] {
