@@ -1,5 +1,9 @@
-//! The statistics of `sampler_lab::stats` against reference values made elsewhere (`tests/reference/`, its README).
+//! The measures and statistics of `sampler_lab::stats` against reference values made elsewhere (`tests/reference/`,
+//! its README).
 
+use sampler_lab::stats::discrepancy::{
+    L2Kind, Points, Side, Star, l2_root, l2_squared, min_toroidal_distance, star, star_2d, t_value,
+};
 use sampler_lab::stats::hypothesis::{benjamini_hochberg, chi2_upper_tail, holm, sidak, welch};
 use sampler_lab::stats::image_error::{bias, mae, max_abs, mse, mse_unbiased, rel_mse, smape};
 use sampler_lab::stats::moments::{Moments, student_t_quantile};
@@ -107,6 +111,159 @@ fn image_metrics_meet_the_reference() {
             (smape(&a, &b), "SMAPE"),
         ] {
             assert_close(ours, &value(name), 1e-12, name);
+        }
+    }
+}
+
+/// φ_b(i) as one correctly rounded quotient of integers.
+fn radical_inverse(base: u64, mut index: u64) -> f64 {
+    let (mut digits, mut power) = (0, 1);
+    while index > 0 {
+        digits = digits * base + index % base;
+        power *= base;
+        index /= base;
+    }
+    digits as f64 / power as f64
+}
+
+/// The second dimension of Sobol': rows of Pascal's triangle modulo 2 are its direction numbers.
+fn sobol_second(index: u32) -> f64 {
+    let mut direction = 1_u32 << 31;
+    let mut bits = 0;
+    for k in 0..32 {
+        if index >> k & 1 == 1 {
+            bits ^= direction;
+        }
+        direction ^= direction >> 1;
+    }
+    f64::from(bits) / 4_294_967_296.0
+}
+
+fn halton23(n: usize) -> Points {
+    let points: Vec<[f64; 2]> = (0..n as u64).map(|i| [radical_inverse(2, i), radical_inverse(3, i)]).collect();
+    Points::new_2d(&points).expect("valid")
+}
+
+fn sobol02(n: usize) -> Points {
+    let points: Vec<[f64; 2]> = (0..n as u32).map(|i| [radical_inverse(2, i.into()), sobol_second(i)]).collect();
+    Points::new_2d(&points).expect("valid")
+}
+
+fn hammersley(m: u32) -> Points {
+    let n = 1_u64 << m;
+    let points: Vec<[f64; 2]> = (0..n).map(|i| [i as f64 / n as f64, radical_inverse(2, i)]).collect();
+    Points::new_2d(&points).expect("valid")
+}
+
+/// Counts the points of the certificate's box anew.
+fn assert_certified(points: &Points, found: &Star, name: &str) {
+    let inside = |p: &&[f64]| p.iter().zip(&found.corner).all(|(x, q)| x < q || (x == q && found.side == Side::Closed));
+    let share = points.iter().filter(inside).count() as f64 / points.n() as f64;
+    let gap = (found.corner.iter().product::<f64>() - share).abs();
+    assert!((gap - found.value).abs() <= 1e-15, "{name}: the box shows {gap}, not {}", found.value);
+}
+
+#[test]
+fn small_sets_meet_their_exact_discrepancies() {
+    let kinds = [
+        ("L2star", L2Kind::Star),
+        ("extreme", L2Kind::Extreme),
+        ("CD", L2Kind::Centred),
+        ("MD", L2Kind::Mixture),
+        ("modified", L2Kind::Modified),
+        ("symmetric", L2Kind::Symmetric),
+        ("WD", L2Kind::WrapAround),
+        ("periodic", L2Kind::Periodic),
+        ("diaphony", L2Kind::Diaphony),
+    ];
+    let reference = reference("discrepancy.json");
+    for case in list(&reference["cases"]) {
+        let name = case["name"].as_str().expect("a name");
+        let dimension = usize::try_from(case["d"].as_u64().expect("a dimension")).expect("small");
+        let flat = match &case["points_f64"][0] {
+            Value::Array(_) => list(&case["points_f64"]).iter().flat_map(list).map(number).collect(),
+            _ => list(&case["points_f64"]).iter().map(number).collect(),
+        };
+        let points = Points::new(dimension, flat).expect("valid");
+        assert_eq!(points.n() as u64, case["n"].as_u64().expect("a count"), "{name}");
+        for (key, kind) in kinds {
+            let (square, root) = (number(&case["values"][key]["squared"]), number(&case["values"][key]["root"]));
+            let ours = l2_squared(&points, kind).expect("above resolution");
+            assert!((ours - square).abs() <= 1e-11 * square, "{name} {key}: {ours:e} against {square:e}");
+            let ours = l2_root(&points, kind).expect("above resolution");
+            assert!((ours - root).abs() <= 1e-11 * root, "{name} {key} root: {ours:e} against {root:e}");
+        }
+        let found = star(&points, 1e6).expect("cheap");
+        let truth = number(&case["values"]["star"]["value"]);
+        assert!((found.value - truth).abs() <= 1e-14, "{name} star: {} against {truth}", found.value);
+        assert_certified(&points, &found, name);
+        let t = case["values"]["t_base2"].as_u64();
+        assert_eq!(t_value(&points).map(u64::from), t, "{name} t");
+        let distance = &case["values"]["min_toroidal_distance"];
+        match min_toroidal_distance(&points) {
+            // One point has no distance; the reference writes that as "inf".
+            None => assert!(number(distance).is_infinite(), "{name}: {distance}"),
+            Some(ours) => assert!((ours - number(distance)).abs() <= 1e-15, "{name} distance: {ours} {distance}"),
+        }
+    }
+}
+
+#[test]
+fn every_prefix_meets_its_exact_star_discrepancy() {
+    let reference = reference("star_prefixes.json");
+    for (sequence, set) in [("halton23", halton23 as fn(usize) -> Points), ("sobol02", sobol02)] {
+        for prefix in list(&reference["prefixes"][sequence]) {
+            let points = set(usize::try_from(prefix["n"].as_u64().expect("a count")).expect("small"));
+            let (numerator, denominator) = match prefix["star"].as_str().expect("a ratio").split_once('/') {
+                Some((a, b)) => (a.parse::<f64>().expect("whole"), b.parse::<f64>().expect("whole")),
+                None => (number(&prefix["star"]), 1.0),
+            };
+            let found = star_2d(&points);
+            let name = format!("{sequence} {}", points.n());
+            assert!((found.value - numerator / denominator).abs() <= 1e-14, "{name}: {}", found.value);
+            assert_certified(&points, &found, &name);
+        }
+    }
+}
+
+/// Halton & Zaremba 1969, Vilenkin 1967; Hinrichs, Kritzinger & Pillichshammer: formulas for any m, here to 4096
+/// points.
+#[test]
+fn hammersley_sets_meet_their_closed_forms() {
+    let close = |ours: f64, truth: f64, relative: f64, what: &str, m: u32| {
+        assert!((ours - truth).abs() <= relative * truth, "m = {m}, {what}: {ours:e} against {truth:e}");
+    };
+    for m in 2..=12 {
+        let points = hammersley(m);
+        let (n, m_) = (points.n() as f64, f64::from(m));
+        let sign = if m % 2 == 0 { 1.0 } else { -1.0 };
+        let truth = (m_ / 3.0 + 13.0 / 9.0 - sign * 4.0 / (9.0 * n)) / n;
+        let found = star_2d(&points);
+        assert!((found.value - truth).abs() <= 1e-14, "m = {m}: {} against {truth}", found.value);
+        assert_certified(&points, &found, "Hammersley");
+        let star =
+            (m_ * m_ / 64.0 + 29.0 * m_ / 192.0 + 0.375 - m_ / (16.0 * n) + 0.25 / n - 1.0 / (72.0 * n * n)) / (n * n);
+        let extreme = (m_ / 64.0 + 1.0 / 72.0 - 1.0 / (144.0 * n * n)) / (n * n);
+        let periodic = (m_ / 16.0 + 1.0 / 9.0 + 1.0 / (36.0 * n * n)) / (n * n);
+        for (kind, truth) in [(L2Kind::Star, star), (L2Kind::Extreme, extreme), (L2Kind::Periodic, periodic)] {
+            close(l2_squared(&points, kind).expect("above resolution"), truth, 1e-9, &format!("{kind:?}"), m);
+        }
+        assert_eq!(t_value(&points), Some(0));
+    }
+}
+
+#[test]
+fn stored_hammersley_values_are_those_of_the_closed_forms() {
+    for row in list(&reference("hammersley_closed_form.json")["rows"]) {
+        let points = hammersley(u32::try_from(row["m"].as_u64().expect("m")).expect("small"));
+        assert!((star_2d(&points).value - number(&row["star"]["value"])).abs() <= 1e-14);
+        for (key, kind) in [
+            ("L2star_squared", L2Kind::Star),
+            ("extreme_squared", L2Kind::Extreme),
+            ("periodic_squared", L2Kind::Periodic),
+        ] {
+            let (ours, truth) = (l2_squared(&points, kind).expect("above resolution"), number(&row[key]["value"]));
+            assert!((ours - truth).abs() <= 1e-12 * truth, "{key} at {}: {ours:e} against {truth:e}", row["m"]);
         }
     }
 }

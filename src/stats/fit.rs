@@ -2,6 +2,7 @@
 
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::Rng;
+use serde::{Deserialize, Serialize};
 
 use super::moments::{student_t_quantile, sum};
 use super::special::normal_upper_tail;
@@ -49,7 +50,8 @@ fn line(x: &[f64], y: &[f64]) -> Option<LineFit> {
 }
 
 /// What an interval of a slope was made from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum IntervalKind {
     /// Replicates resampled at each n: how far another set of replicates would move the slope.
     Bootstrap,
@@ -59,7 +61,7 @@ pub enum IntervalKind {
 }
 
 /// The slope of RMSE in n, with its interval.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SlopeFit {
     /// Slope of ln RMSE against ln n; −0.5 for independent samples.
     pub slope: f64,
@@ -75,15 +77,16 @@ pub struct SlopeFit {
 
 /// Slope of RMSE in n: half the least-squares slope of ln(mean MSE over replicates) against ln n.
 ///
-/// `replicate_mse[k]` are the MSEs of independent replicates at `ns[k]`; unbiased ones may be negative. An n whose *mean*
-/// MSE is not above zero (all of it below the reference's noise) has no logarithm and is left out, which `points` shows.
+/// `replicate_mse[k]` are the MSEs of independent replicates at `ns[k]`; unbiased ones may be negative. An n whose
+/// *mean* MSE is not above zero (all of it below the reference's noise) has no logarithm and is left out, which
+/// `points` shows.
 ///
-/// *With replicates* (at least two at every n): [`BOOTSTRAP_DRAWS`] bootstrap draws, replicates drawn with replacement
-/// independently at each n, by PCG-XSH-RR 64/32 seeded with `seed`. The interval is Hesterberg's expanded percentile one (2015): the
-/// tail level 2.5 % is replaced by Φ(−t √(R/(R−1))), t the 97.5 % quantile at Σ(R_k − 1) degrees of freedom and
-/// R/(R − 1) the ratio Σ R_k/Σ (R_k − 1), since the plain one is too short by about that much at R = 8.
-/// A draw with a mean at or below zero has no slope; it counts as beyond *both* ends, the cautious reading, and where such
-/// draws fill a tail there is no interval.
+/// *With replicates* (at least two at every n): [`BOOTSTRAP_DRAWS`] bootstrap draws, replicates drawn with
+/// replacement independently at each n, by PCG-XSH-RR 64/32 seeded with `seed`. The interval is Hesterberg's expanded
+/// percentile one (2015): the tail level 2.5 % is replaced by Φ(−t √(R/(R−1))), t the 97.5 % quantile at Σ(R_k − 1)
+/// degrees of freedom and R/(R − 1) the ratio Σ R_k/Σ (R_k − 1), since the plain one is too short by about that much
+/// at R = 8. A draw with a mean at or below zero has no slope; it counts as beyond *both* ends, the cautious reading,
+/// and where such draws fill a tail there is no interval.
 ///
 /// *Without*: residuals about the line, from three points on; see [`IntervalKind::Residuals`].
 ///
@@ -139,7 +142,8 @@ fn bootstrap_interval(x: &[f64], kept: &[(f64, &[f64])], seed: u64) -> Option<[f
     Some([*slopes.get(position)?, *slopes.get(slopes.len().checked_sub(position + 1)?)?])
 }
 
-/// The mean of as many values drawn with replacement; indices by multiply and shift of 32 bits (bias below 1e-6 for 4000 values).
+/// The mean of as many values drawn with replacement; indices by multiply and shift of 32 bits (bias below 1e-6 for
+/// 4000 values).
 fn resampled_mean(values: &[f64], rng: &mut Pcg32) -> f64 {
     let count = values.len() as u64;
     let draws = (0..count).map(|_| values[((u64::from(rng.next_u32()) * count) >> 32) as usize]);
@@ -237,8 +241,8 @@ mod tests {
         assert!(fit(a) == fit(b) && fit(a) != fit(c));
     }
 
-    /// Independent samples: RMSE ~ n^−½. 400 experiments of 8 replicates at 6 n: a true 95 % has a standard error of 1.1 %,
-    /// the bounds are 4.6 and 4.1 of them (false alarm about 2e-5 on this one seed).
+    /// Independent samples: RMSE ~ n^−½. 400 experiments of 8 replicates at 6 n: a true 95 % has a standard error of
+    /// 1.1 %, the bounds are 4.6 and 4.1 of them (false alarm about 2e-5 on this one seed).
     #[test]
     fn intervals_of_a_monte_carlo_slope_hold_one_half_at_their_stated_rate() {
         let mut rng = Pcg32::new(5, 5);

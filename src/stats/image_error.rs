@@ -8,6 +8,8 @@
 //! Nothing here skips or mends a pixel: a NaN in gives a NaN out. Count first with [`nonfinite`]. An image of no
 //! pixels has no error (NaN), and slices of unequal length are a mistake of the program: they panic.
 
+use serde::{Deserialize, Serialize};
+
 use super::moments::{Estimate, Moments, jackknife, jackknife_variance, sum, two_sided_factor};
 
 /// ε of the relative mean square error: keeps black pixels finite, in squared radiance.
@@ -105,7 +107,7 @@ pub fn error_autocorrelation(
 /// Error of an estimator from independent replicate images and two references, each number with its interval.
 ///
 /// See [`ensemble`] for the formulas.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ensemble {
     /// Mean square error, unbiased, so possibly negative; squared radiance.
     pub mse: Estimate,
@@ -136,7 +138,8 @@ pub struct Ensemble {
 /// T̄ − R̄ = d − (a + b)/2 is independent of g, Var g = 2Σ, and so E = 2 dᵀΣd + ½ tr(2Σ·Σ). The second-order
 /// term is in there already and must not be added again; heavier tails only enlarge it. Hence
 /// se² = Σ_p (Σ_c (T̄ − R̄) g)²/N², pixels taken as independent. Note (T̄ − R̄) g = ((T̄ − R2)² − (T̄ − R1)²)/2: it is
-/// what swapping the references would change. The spread of T̄ makes se² of `bias2` too wide by a share of order 1/R of itself.
+/// what swapping the references would change. Noise in T̄
+/// makes se² a little too wide, by tr(2Σ V)/R with V the replicates' covariance.
 ///
 /// Both variances add; the interval is Student's with Welch–Satterthwaite degrees of freedom, where each pixel
 /// brings one: ν = 3 (Σw)²/Σw² for squares w of normal numbers (E w² = 3 (E w)²).

@@ -238,4 +238,34 @@ mod tests {
     fn equal_values_have_an_interval_of_no_width() {
         assert_eq!(t_interval(&[0.1; 10], 0.95), Estimate { value: 0.1, ci95: Some([0.1, 0.1]) });
     }
+
+    /// In f32 the running sum of a constant image stalls at 2^24 samples; here 2^25 of them keep their mean.
+    #[test]
+    fn the_mean_of_many_equal_samples_does_not_stall() {
+        let many = 1 << 25;
+        let stalled: f32 = std::iter::repeat_n(1.0_f32, many).sum();
+        assert_eq!(stalled, 16_777_216.0);
+        assert_eq!(sum(std::iter::repeat_n(f64::from(0.1_f32), many)) / many as f64, f64::from(0.1_f32));
+        let moments: Moments = std::iter::repeat_n(f64::from(0.1_f32), many).collect();
+        assert_eq!((moments.mean(), moments.variance()), (Some(f64::from(0.1_f32)), Some(0.0)));
+    }
+
+    /// The order of merges changes roundings only, and one fixed tree gives one set of bits.
+    #[test]
+    fn merges_in_any_order_agree_to_rounding() {
+        let parts: Vec<Moments> =
+            (0..7).map(|p| (0..10 + p).map(|i| 1e3 + f64::from(i * 37 % 11 + p)).collect()).collect();
+        let merged = |order: &[usize]| {
+            let mut total = Moments::default();
+            order.iter().for_each(|&i| total.merge(&parts[i]));
+            total
+        };
+        let first = merged(&[0, 1, 2, 3, 4, 5, 6]);
+        assert_eq!(first, merged(&[0, 1, 2, 3, 4, 5, 6]));
+        for order in [[6, 5, 4, 3, 2, 1, 0], [3, 0, 6, 1, 5, 2, 4]] {
+            let other = merged(&order);
+            let (a, b) = (first.variance().unwrap_or(0.0), other.variance().unwrap_or(1.0));
+            assert!(first.n == other.n && (first.mean - other.mean).abs() < 1e-12 && (a / b - 1.0).abs() < 1e-13);
+        }
+    }
 }

@@ -6,8 +6,10 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
-/// A continued fraction or series stops when a further term changes nothing that f64 can show.
-const CONVERGED: f64 = 1e-16;
+/// A continued fraction stops when its last factor is 1 but for one rounding: asking for less might never end.
+const CONVERGED: f64 = f64::EPSILON;
+/// A series of falling terms stops here, relative to its sum: many terms of this size may still follow.
+const NEGLIGIBLE: f64 = f64::EPSILON / 256.0;
 /// Terms grow like the square root of the parameters; this covers parameters up to about 10¹¹.
 const MAX_TERMS: u32 = 1_000_000;
 
@@ -112,7 +114,7 @@ pub(super) fn incomplete_gamma_upper(a: f64, x: f64) -> f64 {
         for k in 1..MAX_TERMS {
             term *= x / (a + f64::from(k));
             series += term;
-            if term <= series * CONVERGED {
+            if term <= series * NEGLIGIBLE {
                 break;
             }
         }

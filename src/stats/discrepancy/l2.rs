@@ -50,7 +50,22 @@ impl L2Kind {
         Self::Diaphony,
     ];
 
-    /// E[D²] of n independent uniform points in d dimensions: (K̄^d − c^d)/n with K̄ the mean of K(x, x).
+    /// The name under which results are recorded.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Star => "l2_star",
+            Self::Extreme => "extreme_l2",
+            Self::Centred => "centred_l2",
+            Self::Mixture => "mixture_l2",
+            Self::Modified => "modified_l2",
+            Self::Symmetric => "symmetric_l2",
+            Self::WrapAround => "wrap_around_l2",
+            Self::Periodic => "periodic_l2",
+            Self::Diaphony => "diaphony",
+        }
+    }
+
+    /// Expectation of D² for n independent uniform points in d dimensions: (K̄^d − c^d)/n with K̄ the mean of K(x, x).
     ///
     /// The mean of squared discrepancies; the mean of their roots is smaller (Jensen).
     pub fn expected_squared_of_random(self, n: usize, dimension: usize) -> f64 {
@@ -70,9 +85,9 @@ impl L2Kind {
 
 /// Squared L2 discrepancy of a kind; `None` where it is below the resolution of f64.
 ///
-/// O(d n²/2) time in parallel, O(n) memory. The absolute error is at most about (d + 1) ε mean Π K (single products round, sums
-/// do not) and typically far less, as roundings average out; a result not above that bound is `None`, never a
-/// root of a negative number. The same bits on any number of threads: rows are added in order.
+/// O(d n²/2) time in parallel, O(n) memory. The absolute error is at most about (d + 1) ε mean Π K (single products
+/// round, sums do not) and typically far less, as roundings average out; a result not above that bound is `None`,
+/// never a root of a negative number. The same bits on any number of threads: rows are added in order.
 pub fn l2_squared(points: &Points, kind: L2Kind) -> Option<f64> {
     let toroidal = |constant: f64| move |x: f64, y: f64| constant - (x - y).abs() * (1.0 - (x - y).abs());
     let half = |x: f64| (x - 0.5).abs();
@@ -229,7 +244,7 @@ impl Double {
     /// a · b exactly, by the fused multiply-add (one rounding by definition, on every machine).
     fn product(a: f64, b: f64) -> Self {
         let high = a * b;
-        Self { high, low: a.mul_add(b, -high) }
+        Self { high, low: libm::fma(a, b, -high) }
     }
 
     fn ratio(numerator: f64, denominator: f64) -> Self {
@@ -299,7 +314,7 @@ mod tests {
         l2_squared(&points(set), kind).expect("above resolution")
     }
 
-    /// Twin: the formulas of METHODS §2 typed plainly, all n² pairs, no symmetry, no compensation.
+    /// Twin: the formulas of [`L2Kind`] typed plainly, all n² pairs, no symmetry, no compensation.
     fn by_formula(set: &[Vec<f64>], kind: L2Kind) -> f64 {
         let (n, d) = (set.len() as f64, set[0].len() as i32);
         let h = |x: f64| {
@@ -409,7 +424,7 @@ mod tests {
         }
     }
 
-    /// n midpoints in one dimension (METHODS §2, exact): 1/(12n²) and its multiples.
+    /// n midpoints in one dimension (exact): 1/(12n²) and its multiples.
     #[test]
     fn midpoints_meet_their_closed_forms() {
         for n in [1_u32, 2, 10, 255, 1024] {
@@ -440,7 +455,7 @@ mod tests {
         }
     }
 
-    /// Means over 400 sets of 16 random points against (METHODS §2) the expectation. The relative spread of D² of one
+    /// Means over 400 sets of 16 random points against the expectation. The relative spread of D² of one
     /// set is below 1, so the mean's standard error is below 0.05; six of them are allowed.
     #[test]
     fn random_points_meet_the_expectation_of_every_kind() {

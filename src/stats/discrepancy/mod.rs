@@ -10,4 +10,15 @@ mod star;
 pub use l2::{L2Kind, l2_root, l2_squared};
 pub use nets::{min_toroidal_distance, t_value};
 pub use points::{Points, PointsError};
-pub use star::{CostTooHigh, Side, Star, star, star_1d, star_2d, star_cost};
+pub use star::{CostTooHigh, STAR_COST_LIMIT, Side, Star, star, star_1d, star_2d, star_cost};
+
+#[cfg(test)]
+mod testing {
+    use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+
+    /// Property tests that draw the same cases every time and leave no files behind.
+    pub fn runner(cases: u32) -> TestRunner {
+        let config = Config { cases, failure_persistence: None, ..Config::default() };
+        TestRunner::new_with_rng(config, TestRng::from_seed(RngAlgorithm::ChaCha, &[1; 32]))
+    }
+}

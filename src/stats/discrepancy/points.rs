@@ -64,6 +64,8 @@ impl Points {
         if let Some(i) = coordinates.iter().position(|v| !(0.0..=1.0).contains(v)) {
             return Err(PointsError::Outside { index: i / dimension, axis: i % dimension, value: coordinates[i] });
         }
+        // −0 becomes 0: one place, one number, in sorting and in print.
+        let coordinates = coordinates.into_iter().map(|x| x + 0.0).collect();
         Ok(Self { dimension, coordinates })
     }
 
@@ -118,5 +120,6 @@ mod tests {
         let corners = Points::new(2, vec![0.0, 1.0, 1.0, 0.0]).expect("valid");
         assert_eq!((corners.n(), corners.dimension()), (2, 2));
         assert_eq!(corners.axis(1), [1.0, 0.0]);
+        assert!(Points::new(1, vec![-0.0]).expect("valid").axis(0)[0].is_sign_positive());
     }
 }
