@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 /// The scenes' names: `data/NAME/NAME.obj`.
-const SCENES: [&str; 2] = ["checkerpots", "cornell"];
+const SCENES: [&str; 3] = ["checkerpots", "cornell", "penumbra"];
 
 /// The folder of committed scenes.
 fn data() -> PathBuf {
@@ -102,7 +102,7 @@ fn making_the_scenes_again_gives_the_committed_bytes() {
     let folder = tempfile::tempdir().unwrap();
     generate::write_all(folder.path()).unwrap();
     let (made, committed) = (files(folder.path()), files(&data()));
-    assert!(made.len() >= 6);
+    assert_eq!(made.len(), 8);
     for (path, bytes) in &made {
         assert!(committed.get(path) == Some(bytes), "{}: run `cargo run --example make_scenes`", path.display());
     }
@@ -288,8 +288,22 @@ fn each_light_is_one_parallelogram_that_faces_down() {
         assert!((b - a).dot(d - a).abs() < 1e-12, "{scene}: a rectangle");
         assert!(first.cross().y < 0.0 && second.cross().y < 0.0, "{scene}");
         let lowest = a.y.min(b.y).min(c.y).min(d.y);
-        assert!(lights[0].triangles[0].cross().dot(DVec3::new(0.9, 0.0, 0.0) - a) > 0.0 || scene != "checkerpots");
         assert!(lowest > 2.0, "{scene}: above the scene");
+    }
+}
+
+#[test]
+fn the_light_of_checkerpots_shines_on_every_body_and_every_tile_in_the_picture() {
+    let objects = objects("checkerpots");
+    let light = objects.iter().find(|o| o.material == "light").unwrap().triangles[0];
+    // In the picture: in front of the camera, and within its 16:9 field of view to the sides (tan 35° · 16/9 = 1.245).
+    let (eye, ahead) = (DVec3::new(-0.56543, 3.2923, -4.4922), DVec3::new(0.2526, -0.56456, 0.78579).normalize());
+    let right = ahead.cross(DVec3::new(0.17297, 0.82539, 0.5374)).normalize();
+    let in_picture = |p: &DVec3| (*p - eye).dot(right).abs() < 1.245 * (*p - eye).dot(ahead);
+    for object in objects.iter().filter(|o| o.material != "light") {
+        for corner in object.triangles.iter().flat_map(|t| t.corners).filter(in_picture) {
+            assert!(light.corners.iter().all(|l| light.cross().dot(corner - *l) > 0.0), "{}: {corner}", object.name);
+        }
     }
 }
 
@@ -372,5 +386,24 @@ fn materials_carry_the_published_albedos() {
         "newmtl light\nKd 1 1 1\nKe 15 15 15\n",
     ] {
         assert!(text.contains(block), "{block}");
+    }
+}
+
+#[test]
+fn penumbra_is_a_plane_a_strip_and_a_light_at_the_closed_form_s_numbers() {
+    let objects = objects("penumbra");
+    let quad = |name: &str| -> Vec<DVec3> {
+        let object = objects.iter().find(|o| o.name == name && o.material == name).unwrap();
+        let [first, second] = object.triangles[..] else { panic!("{object:?}") };
+        vec![first.corners[0], first.corners[1], first.corners[2], second.corners[2]]
+    };
+    let at = |height: f64, corners: [[f64; 2]; 4]| corners.map(|[x, z]| DVec3::new(x, height, z)).to_vec();
+    assert_eq!(objects.len(), 3);
+    assert_eq!(quad("plane"), at(0.0, [[-8.0, -8.0], [-8.0, 8.0], [8.0, 8.0], [8.0, -8.0]]));
+    assert_eq!(quad("light"), at(3.0, [[-1.0, 0.0], [0.0, 0.0], [0.0, 1.0], [-1.0, 1.0]]));
+    let strip = [[-5.90625, -1.6875], [6.09375, 1.3125], [5.90625, 2.0625], [-6.09375, -0.9375]];
+    assert_eq!(quad("blocker"), at(1.0, strip));
+    for corner in ["plane", "blocker", "light"].map(quad).into_iter().flatten().flat_map(|c| c.to_array()) {
+        assert_eq!(f64::from(corner as f32), corner, "exact in f32");
     }
 }

@@ -16,11 +16,11 @@ Made by examples/make_scenes.";
 const MATERIALS: [Material; 8] = [
     Material { name: "tile_pale", lines: "Kd 1 1 1\nmap_Kd marble_pale.png" },
     Material { name: "tile_dark", lines: "Kd 1 1 1\nmap_Kd marble_dark.png" },
-    Material { name: "teapot_diffuse", lines: "Kd 0.62 0.19 0.08" },
+    Material { name: "teapot_diffuse", lines: "Kd 0.56 0.155 0.06" },
     Material { name: "teapot_diffuse.001", lines: "Kd 0.05 0.3 0.31" },
     Material { name: "teapot_specular", lines: "Kd 0 0 0\nKs 0.8 0.72 0.58" },
-    Material { name: "vase_glaze", lines: "Kd 0.72 0.42 0.07" },
-    Material { name: "ball_lacquer", lines: "Kd 0.36 0.04 0.06" },
+    Material { name: "vase_glaze", lines: "Kd 0.64 0.34 0.04" },
+    Material { name: "ball_lacquer", lines: "Kd 0.3 0.025 0.04" },
     Material { name: "light", lines: "Kd 1 1 1\nKe 10 10 10" },
 ];
 
@@ -41,7 +41,7 @@ const DARK: Marble = Marble {
 /// # Errors
 /// Kind `Write` where a file cannot be written.
 pub fn write(folder: &Path) -> Result<()> {
-    let mut obj = Obj::default();
+    let mut obj = Obj::new(4);
     add_floor(&mut obj);
     add_pots(&mut obj);
     add_vase(&mut obj);
@@ -134,8 +134,8 @@ fn add_ball(obj: &mut Obj) {
 
 /// A rectangle high behind the camera's left shoulder, looking down into the scene.
 fn add_light(obj: &mut Obj) {
-    let corner = DVec3::new(6.0, 7.0, -7.5);
-    let (across, up) = (DVec3::new(3.0, 0.0, 2.75), DVec3::new(-2.0625, 3.0, 2.25));
+    let corner = DVec3::new(5.25, 6.75, -7.0);
+    let (across, up) = (DVec3::new(3.5, 0.0, 1.75), DVec3::new(-1.25, 3.75, 2.5));
     obj.object("light", "light");
     obj.flat_quad([corner, corner + across, corner + across + up, corner + up]);
 }

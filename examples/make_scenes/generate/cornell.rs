@@ -42,7 +42,7 @@ const MATERIALS: [Material; 4] = [
 pub fn write(folder: &Path) -> Result<()> {
     let measured: Measurements =
         serde_json::from_str(include_str!("../cornell.json")).expect("cornell.json is part of this program");
-    let mut obj = Obj::default();
+    let mut obj = Obj::new(4);
     for quad in &measured.quads {
         let name = if quad.material == "light" { "light".to_owned() } else { quad.name.replace(' ', "_") };
         obj.object(&name, &quad.material);

@@ -92,3 +92,28 @@ pub fn mix(bits: u32) -> u32 {
     bits = (bits ^ (bits >> 15)).wrapping_mul(0x846C_A68B);
     bits ^ (bits >> 16)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_zero_on_its_lattice_bounded_by_one_and_periodic() {
+        for i in 0..1000 {
+            let (x, y) = (f64::from(i) * 0.0137, f64::from(i) * 0.0071);
+            let value = gradient_noise(9, 4, x, y);
+            assert!(value.abs() <= 1.0);
+            // One period further the fraction of a cell is off by the rounding of x · 4 alone.
+            assert!((gradient_noise(9, 4, x + 1.0, y - 2.0) - value).abs() < 1e-12);
+        }
+        assert_eq!(gradient_noise(9, 4, 0.25, 0.75), 0.0);
+    }
+
+    #[test]
+    fn mixing_sends_no_two_of_a_million_words_to_one() {
+        let mut mixed: Vec<u32> = (0..1_000_000).map(mix).collect();
+        mixed.sort_unstable();
+        mixed.dedup();
+        assert_eq!(mixed.len(), 1_000_000);
+    }
+}

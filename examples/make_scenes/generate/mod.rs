@@ -4,6 +4,7 @@ pub mod checkerpots;
 pub mod cornell;
 pub mod marble;
 pub mod obj;
+pub mod penumbra;
 pub mod solids;
 pub mod teapot;
 
@@ -17,5 +18,6 @@ use sampler_lab::error::Result;
 /// Kind `Write` where a file cannot be written.
 pub fn write_all(folder: &Path) -> Result<()> {
     checkerpots::write(&folder.join("checkerpots"))?;
-    cornell::write(&folder.join("cornell"))
+    cornell::write(&folder.join("cornell"))?;
+    penumbra::write(&folder.join("penumbra"))
 }

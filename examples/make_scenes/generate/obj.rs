@@ -32,8 +32,9 @@ pub struct Material {
 ///
 /// Corners weld where they *print* alike: a shared edge of two patches is one edge in the file, and whatever closes up
 /// to a point (a pole, a lid's knob) becomes triangles.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Obj {
+    decimals: usize,
     vertices: Pool,
     uvs: Pool,
     normals: Pool,
@@ -61,24 +62,30 @@ impl Pool {
     }
 }
 
-/// Four decimals without trailing zeros: `0.5`, `-3`, `12.0625`.
+/// A number with at most `decimals` decimals, without trailing zeros: `0.5`, `-3`, `12.0625`.
 ///
 /// Ties are moved off by a thousandth of the last place, so two patches that reach one point by different roundings
 /// print the same point.
-fn short(x: f64) -> String {
-    const PLACES: f64 = 1e4;
-    let scaled = (x * PLACES + 0.501).floor();
-    let text = format!("{:.4}", scaled / PLACES);
+fn short(x: f64, decimals: usize) -> String {
+    let places = libm::pow(10.0, decimals as f64);
+    let scaled = (x * places + 0.501).floor();
+    let text = format!("{:.decimals$}", scaled / places);
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
 /// Numbers as they follow a keyword, each after a space.
-fn spaced(numbers: impl IntoIterator<Item = f64>) -> String {
-    numbers.into_iter().fold(String::new(), |line, x| line + " " + &short(x))
+fn spaced(numbers: impl IntoIterator<Item = f64>, decimals: usize) -> String {
+    numbers.into_iter().fold(String::new(), |line, x| line + " " + &short(x, decimals))
 }
 
 impl Obj {
+    /// An empty file whose numbers carry at most `decimals` decimals.
+    pub fn new(decimals: usize) -> Self {
+        let [vertices, uvs, normals] = std::array::from_fn(|_| Pool::default());
+        Self { decimals, vertices, uvs, normals, faces: String::new() }
+    }
+
     /// Starts an object of one material.
     pub fn object(&mut self, name: &str, material: &str) {
         self.faces += &format!("o {name}\nusemtl {material}\n");
@@ -112,9 +119,9 @@ impl Obj {
 
     /// The vertex index of a corner, and the corner as a face line refers to it.
     fn corner(&mut self, corner: &Corner) -> (usize, String) {
-        let vertex = self.vertices.index("v", spaced(corner.position.to_array()));
-        let uv = corner.uv.map(|uv| self.uvs.index("vt", spaced(uv)));
-        let normal = corner.normal.map(|n| self.normals.index("vn", spaced(n.to_array())));
+        let vertex = self.vertices.index("v", spaced(corner.position.to_array(), self.decimals));
+        let uv = corner.uv.map(|uv| self.uvs.index("vt", spaced(uv, self.decimals)));
+        let normal = corner.normal.map(|n| self.normals.index("vn", spaced(n.to_array(), self.decimals)));
         let reference = match (uv, normal) {
             (None, None) => format!("{vertex}"),
             (Some(uv), None) => format!("{vertex}/{uv}"),
@@ -134,7 +141,7 @@ impl Obj {
     /// # Errors
     /// Kind `Write` where a file cannot be written.
     pub fn write(&self, folder: &Path, name: &str, about: &str, materials: &[Material]) -> Result<()> {
-        let Self { vertices, uvs, normals, faces } = self;
+        let Self { vertices, uvs, normals, faces, .. } = self;
         let header = about.lines().map(|line| format!("# {line}\n")).collect::<String>();
         let obj = format!("{header}mtllib {name}.mtl\n{}{}{}{faces}", vertices.text, uvs.text, normals.text);
         let mut mtl = header;
@@ -144,5 +151,39 @@ impl Obj {
         }
         write_whole(&folder.join(format!("{name}.obj")), obj.as_bytes())?;
         write_whole(&folder.join(format!("{name}.mtl")), mtl.as_bytes())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Corners with normals up.
+    fn upward(points: [[f64; 3]; 4]) -> [Corner; 4] {
+        points.map(|p| Corner { position: DVec3::from_array(p), normal: Some(DVec3::Y), uv: None })
+    }
+
+    #[test]
+    fn numbers_are_short_and_a_tie_prints_alike_from_both_sides() {
+        assert_eq!([0.5, -3.0, 12.0625, 1e-9, -1e-9].map(|x| short(x, 4)), ["0.5", "-3", "12.0625", "0", "0"]);
+        let tie = 0.00025_f64;
+        assert_eq!(short(tie.next_down(), 4), short(tie.next_up(), 4));
+        assert_eq!(short(-5.90625, 5), "-5.90625");
+    }
+
+    #[test]
+    fn a_quad_wound_against_its_normals_is_turned() {
+        let mut obj = Obj::new(4);
+        obj.face(&upward([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0], [0.0, 0.0, 1.0]]));
+        assert_eq!(obj.faces, "f 4//1 3//1 2//1 1//1\n");
+    }
+
+    #[test]
+    fn a_quad_with_two_corners_in_one_place_is_a_triangle_and_one_of_no_area_is_nothing() {
+        let mut obj = Obj::new(4);
+        obj.face(&upward([[0.0; 3], [0.0, 0.0, 1e-9], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]));
+        assert_eq!(obj.faces, "f 1//1 2//1 3//1\n");
+        obj.face(&upward([[0.0; 3], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0; 3]]));
+        assert_eq!(obj.faces.lines().count(), 1);
     }
 }

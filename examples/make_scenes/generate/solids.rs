@@ -97,3 +97,36 @@ pub fn bernstein_slopes(t: f64) -> [f64; 4] {
     let s = 1.0 - t;
     [-3.0 * s * s, 3.0 * s * (s - 2.0 * t), 3.0 * t * (2.0 * s - t), 3.0 * t * t]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bernstein_polynomials_sum_to_one_and_their_slopes_to_zero() {
+        for t in [0.0, 0.1, 0.5, 0.77, 1.0] {
+            assert!((bernstein(t).iter().sum::<f64>() - 1.0).abs() < 1e-15);
+            assert!(bernstein_slopes(t).iter().sum::<f64>().abs() < 1e-15);
+        }
+        assert_eq!(bernstein(0.5), [0.125, 0.375, 0.375, 0.125]);
+        assert_eq!(bernstein_slopes(0.0), [-3.0, 3.0, 0.0, 0.0]);
+        assert_eq!(bernstein_slopes(1.0), [0.0, 0.0, -3.0, 3.0]);
+    }
+
+    #[test]
+    fn a_profile_traced_up_the_outside_has_normals_away_from_the_axis() {
+        let wall = [[[2.0, 0.0], [2.0, 1.0], [2.0, 2.0], [2.0, 3.0]]];
+        let profile = bezier_profile(&wall, 3);
+        assert_eq!(profile.len(), 4);
+        let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() < 1e-15 && (a[1] - b[1]).abs() < 1e-15;
+        assert!(profile.iter().all(|p| near(p.normal, [1.0, 0.0]) && near(p.at, [2.0, p.at[1]])));
+    }
+
+    #[test]
+    fn a_quarter_turn_is_counter_clockwise_seen_from_above() {
+        let place = Place { origin: DVec3::new(5.0, 0.0, 0.0), scale: 2.0, turn_degrees: 90.0 };
+        let corner = place.corner(DVec3::X, DVec3::X);
+        assert!(corner.position.distance(DVec3::new(5.0, 0.0, -2.0)) < 1e-15);
+        assert!(corner.normal.is_some_and(|n| n.distance(-DVec3::Z) < 1e-15));
+    }
+}
