@@ -1,1 +1,10 @@
 //! Reports: figures, tables and sentences out of rows.
+pub mod bias_variance;
+pub mod figure;
+pub mod pareto;
+pub mod pictures;
+pub mod plots;
+pub mod style;
+
+mod axis;
+mod labels;

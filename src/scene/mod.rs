@@ -1,1 +1,2 @@
 //! Scenes: config files, meshes, camera, lights.
+pub mod json;

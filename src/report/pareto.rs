@@ -1,0 +1,327 @@
+//! Speed against accuracy: seconds and error of every sampler and count, and which of them nothing beats at both.
+
+use super::axis::{LogAxis, number_label};
+use super::figure::{Align, Bounds, Dash, Drawing, Figure, PAGE_WIDTH, Place, Text, shortened, text_width};
+use super::labels::kept_apart;
+use super::plots::{Frame, Header, KEY, LeftOut, SMALL, TICK, TITLE};
+use super::style::{GREY, GRID, INK, PALE, Style, draw_key, draw_marker, lightened, style_of};
+
+/// One sampler at one count: what it cost and how far off it was.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trial {
+    /// Its line in the legend; trials of one label are joined in the order given.
+    pub label: String,
+    /// What tells it from the others of its label: `16 spp`.
+    pub detail: String,
+    /// Colour and shape.
+    pub style: Style,
+    /// Median seconds.
+    pub seconds: f64,
+    /// Spread of the seconds, low and high.
+    pub seconds_interval: Option<(f64, f64)>,
+    /// Error in the units of the y axis.
+    pub error: f64,
+    /// Its interval, low and high.
+    pub error_interval: Option<(f64, f64)>,
+}
+
+impl Trial {
+    /// A trial of the sampler `name`, in its style, without intervals.
+    pub fn of_sampler(name: &str, detail: &str, seconds: f64, error: f64) -> Self {
+        let (label, detail, style) = (name.to_owned(), detail.to_owned(), style_of(name));
+        Self { label, detail, style, seconds, seconds_interval: None, error, error_interval: None }
+    }
+}
+
+/// Indices of the trials that no other beats: none is at least as good in both coordinates and better in one; by
+/// ascending seconds, of equal trials the first. Coordinates must be finite.
+pub fn pareto_front(trials: &[(f64, f64)]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..trials.len()).collect();
+    order.sort_by(|&a, &b| trials[a].0.total_cmp(&trials[b].0).then(trials[a].1.total_cmp(&trials[b].1)));
+    let mut least = f64::INFINITY;
+    order.retain(|&i| {
+        let better = trials[i].1 < least;
+        least = least.min(trials[i].1);
+        better
+    });
+    order
+}
+
+/// Seconds (x) against error (y), both logarithmic, with the Pareto front as a step line and its members named; the
+/// others are drawn light. Axis names and title come from `frame`; its `x_ticks` are not used.
+///
+/// The front is that of the medians. Trials whose seconds or error are not above 0 or not finite are left out and
+/// counted under the subtitle.
+pub fn pareto_chart(frame: &Frame, trials: &[Trial]) -> Figure {
+    drawn(frame, trials).finish(&frame.title)
+}
+
+fn drawn(frame: &Frame, trials: &[Trial]) -> Drawing {
+    let mut left_out = LeftOut::default();
+    let trials: Vec<Trial> =
+        trials.iter().filter(|trial| left_out.admits(&[trial.seconds, trial.error])).map(cleaned).collect();
+    let header = Header::new(frame, &[left_out.note()]);
+    let labels = legend(&trials);
+    let widest = labels.iter().map(|(label, _)| text_width(label, SMALL, false)).fold(60.0, f64::max).min(200.0);
+    let height = header.height + 440.0_f64.max(20.0 * (labels.len() + 2) as f64) + 46.0;
+    let mut drawing = Drawing::new(PAGE_WIDTH, height);
+    header.draw(&mut drawing);
+    let bounds = Bounds {
+        left: 80.0,
+        top: header.height,
+        right: PAGE_WIDTH - widest - KEY - 32.0,
+        bottom: drawing.height - 46.0,
+    };
+    let chart = Chart::new(&trials, bounds);
+    chart.draw_frame(&mut drawing, frame);
+    draw_legend(&mut drawing, &labels, (bounds.right + 16.0, bounds.top + 8.0), widest);
+    chart.draw(&mut drawing);
+    drawing
+}
+
+/// The trial without intervals that cannot be drawn.
+fn cleaned(trial: &Trial) -> Trial {
+    let drawable = |interval: &(f64, f64)| interval.0.is_finite() && interval.1.is_finite() && interval.1 > 0.0;
+    Trial {
+        seconds_interval: trial.seconds_interval.filter(drawable),
+        error_interval: trial.error_interval.filter(drawable),
+        ..trial.clone()
+    }
+}
+
+fn legend(trials: &[Trial]) -> Vec<(String, Style)> {
+    let mut labels: Vec<(String, Style)> = Vec::new();
+    for trial in trials {
+        if !labels.iter().any(|(label, _)| *label == trial.label) {
+            labels.push((trial.label.clone(), trial.style));
+        }
+    }
+    labels
+}
+
+fn draw_legend(drawing: &mut Drawing, labels: &[(String, Style)], (left, top): Place, width: f64) {
+    for (i, (label, style)) in labels.iter().enumerate() {
+        let y = top + 20.0 * i as f64;
+        draw_key(drawing, left, y, KEY, style);
+        drawing.text((left + KEY + 6.0, y + 4.0), &shortened(label, SMALL, false, width), SMALL, INK, Align::Left);
+    }
+    if !labels.is_empty() {
+        let y = top + 20.0 * labels.len() as f64 + 8.0;
+        let step = [(left, y - 5.0), (left + KEY / 2.0, y - 5.0), (left + KEY / 2.0, y + 5.0), (left + KEY, y + 5.0)];
+        drawing.line(&step, 1.6, INK, Dash::Solid);
+        drawing.text((left + KEY + 6.0, y + 4.0), "Pareto front", SMALL, INK, Align::Left);
+    }
+}
+
+/// Trials on their axes.
+struct Chart<'a> {
+    trials: &'a [Trial],
+    front: Vec<usize>,
+    x: LogAxis,
+    y: LogAxis,
+    b: Bounds,
+}
+
+/// How far an interval may widen the axes beyond the values.
+const INTERVAL_REACH: f64 = 2.0;
+
+/// An axis that holds the values and, within reason, their intervals.
+fn axis_of(values: &[(f64, Option<(f64, f64)>)], from: f64, to: f64) -> LogAxis {
+    let (low, high) = values.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(v.0), h.max(v.0)));
+    let ends = values.iter().filter_map(|v| v.1);
+    let ends = ends.flat_map(|(l, h)| [l.max(low / INTERVAL_REACH), h.min(high * INTERVAL_REACH)]);
+    LogAxis::around(values.iter().map(|v| v.0).chain(ends), 0.06, from, to)
+}
+
+impl<'a> Chart<'a> {
+    /// Leaves room for names at the left, and below where the names run over the bottom.
+    fn new(trials: &'a [Trial], b: Bounds) -> Self {
+        let front = pareto_front(&trials.iter().map(|t| (t.seconds, t.error)).collect::<Vec<_>>());
+        let seconds: Vec<_> = trials.iter().map(|t| (t.seconds, t.seconds_interval)).collect();
+        let errors: Vec<_> = trials.iter().map(|t| (t.error, t.error_interval)).collect();
+        let widest = front.iter().map(|&i| text_width(&name(&trials[i]), NAME, false)).fold(0.0, f64::max);
+        let x = axis_of(&seconds, b.left + widest.min(0.4 * (b.right - b.left)), b.right);
+        let y = axis_of(&errors, b.bottom - NAME_STEP, b.top);
+        Self { trials, front, x, y, b }
+    }
+
+    fn place(&self, trial: &Trial) -> Place {
+        (self.x.pixel(trial.seconds), self.y.pixel(trial.error))
+    }
+
+    fn draw_frame(&self, drawing: &mut Drawing, frame: &Frame) {
+        let b = self.b;
+        for tick in self.y.ticks(9) {
+            let y = self.y.pixel(tick);
+            drawing.line(&[(b.left, y), (b.right, y)], 1.0, GRID, Dash::Solid);
+            drawing.text((b.left - 7.0, y + 4.0), &number_label(tick), TICK, GREY, Align::Right);
+        }
+        let ticks = self.x.ticks(9);
+        let spans: Vec<(f64, f64)> =
+            ticks.iter().map(|&t| (self.x.pixel(t), text_width(&number_label(t), TICK, false))).collect();
+        for ((&tick, &(x, _)), shown) in ticks.iter().zip(&spans).zip(kept_apart(&spans, 6.0)) {
+            drawing.line(&[(x, b.top), (x, b.bottom)], 1.0, GRID, Dash::Solid);
+            if shown {
+                drawing.text((x, b.bottom + 17.0), &number_label(tick), TICK, GREY, Align::Centre);
+            }
+        }
+        for x in self.x.small_ticks().into_iter().map(|tick| self.x.pixel(tick)) {
+            drawing.line(&[(x, b.bottom - 3.0), (x, b.bottom)], 1.0, PALE, Dash::Solid);
+        }
+        for y in self.y.small_ticks().into_iter().map(|tick| self.y.pixel(tick)) {
+            drawing.line(&[(b.left, y), (b.left + 3.0, y)], 1.0, PALE, Dash::Solid);
+        }
+        drawing.line(&[(b.left, b.top), (b.left, b.bottom), (b.right, b.bottom)], 1.0, PALE, Dash::Solid);
+        drawing.text(((b.left + b.right) / 2.0, b.bottom + 36.0), &frame.x_label, SMALL, INK, Align::Centre);
+        let at = (10.0 + 0.76 * SMALL, (b.top + b.bottom) / 2.0);
+        let text = shortened(&frame.y_label, SMALL, false, b.bottom - b.top);
+        drawing.add_text(Text { at, text, size: SMALL, bold: false, colour: INK, align: Align::Centre, turned: true });
+    }
+
+    fn draw(&self, drawing: &mut Drawing) {
+        if self.trials.is_empty() {
+            let middle = ((self.b.left + self.b.right) / 2.0, (self.b.top + self.b.bottom) / 2.0);
+            drawing.text(middle, "no data", TITLE, GREY, Align::Centre);
+            return;
+        }
+        for (label, style) in legend(self.trials) {
+            let line: Vec<Place> = self.trials.iter().filter(|t| t.label == label).map(|t| self.place(t)).collect();
+            drawing.line(&line, 1.0, lightened(style.colour, 0.65), style.dash);
+        }
+        let on_front = |i: &usize| self.front.contains(i);
+        let (front, others): (Vec<usize>, Vec<usize>) = (0..self.trials.len()).partition(on_front);
+        for &i in &others {
+            self.draw_trial(drawing, &self.trials[i], 0.55);
+        }
+        self.draw_front(drawing);
+        for &i in &front {
+            self.draw_trial(drawing, &self.trials[i], 0.0);
+        }
+        self.draw_names(drawing);
+    }
+
+    /// A marker with its intervals as a cross of bars; `light` moves its colours towards white.
+    fn draw_trial(&self, drawing: &mut Drawing, trial: &Trial, light: f64) {
+        let style = Style { colour: lightened(trial.style.colour, light), ..trial.style };
+        let bars = lightened(trial.style.colour, light.max(0.35));
+        let (x, y) = self.place(trial);
+        if let Some((low, high)) = trial.seconds_interval {
+            drawing.line(&[(self.x.clamped(low), y), (self.x.clamped(high), y)], 1.6, bars, Dash::Solid);
+        }
+        if let Some((low, high)) = trial.error_interval {
+            drawing.line(&[(x, self.y.clamped(low)), (x, self.y.clamped(high))], 1.6, bars, Dash::Solid);
+        }
+        draw_marker(drawing, (x, y), if light > 0.0 { 3.0 } else { 4.2 }, &style);
+    }
+
+    /// From the top edge down to the cheapest member, along the steps, and out to the right edge.
+    fn draw_front(&self, drawing: &mut Drawing) {
+        let places: Vec<Place> = self.front.iter().map(|&i| self.place(&self.trials[i])).collect();
+        let (Some(first), Some(last)) = (places.first(), places.last()) else { return };
+        let mut steps = vec![(first.0, self.b.top), *first];
+        for ends in places.windows(2) {
+            steps.extend([(ends[1].0, ends[0].1), ends[1]]);
+        }
+        steps.push((self.b.right, last.1));
+        drawing.line(&steps, 1.6, INK, Dash::Solid);
+    }
+
+    /// Names the members of the front. Below and left of it nothing stands, by its definition: each name goes there, right
+    /// of nothing but its own marker, as high as the names before it allow; so no name or leader crosses another.
+    fn draw_names(&self, drawing: &mut Drawing) {
+        let names: Vec<String> = self.front.iter().map(|&i| name(&self.trials[i])).collect();
+        for ((&i, name), baseline) in self.front.iter().zip(names).zip(self.baselines()) {
+            let (x, y) = self.place(&self.trials[i]);
+            let reach = |t: &Trial| t.seconds_interval.map_or(t.seconds, |(low, _)| low.min(t.seconds));
+            let in_the_way = self.trials.iter().filter(|t| {
+                let (top, bottom) = self.rows(t);
+                top < baseline + 4.0 && bottom > baseline - NAME
+            });
+            let right =
+                in_the_way.map(|t| self.x.clamped(reach(t)).min(self.place(t).0 - 7.0)).fold(x - 7.0, f64::min) - 3.0;
+            let text = Text {
+                at: (right.max(self.b.left + 4.0 + text_width(&name, NAME, false)), baseline),
+                text: name,
+                size: NAME,
+                bold: false,
+                colour: INK,
+                align: Align::Right,
+                turned: false,
+            };
+            if baseline - y > NAME + 4.0 {
+                drawing.line(&[(text.at.0 + 2.0, baseline - 4.0), (x, y + 6.0)], 0.8, PALE, Dash::Solid);
+            }
+            drawing.add_text(text);
+        }
+    }
+
+    /// First and last row of pixels that a trial's marker and vertical bar take.
+    fn rows(&self, trial: &Trial) -> (f64, f64) {
+        let y = self.place(trial).1;
+        let (low, high) = trial.error_interval.unwrap_or((trial.error, trial.error));
+        (self.y.clamped(high).min(y - 6.0), self.y.clamped(low).max(y + 6.0))
+    }
+
+    /// Baselines of the front's names: each just below its marker or below the name before it; at the bottom moved up
+    /// as far as needed.
+    fn baselines(&self) -> Vec<f64> {
+        let mut next = f64::NEG_INFINITY;
+        let mut baselines: Vec<f64> = Vec::new();
+        for &i in &self.front {
+            let y = (self.place(&self.trials[i]).1 + NAME + 2.0).max(next);
+            baselines.push(y);
+            next = y + NAME_STEP;
+        }
+        let mut limit = self.b.bottom - 5.0;
+        for y in baselines.iter_mut().rev() {
+            *y = y.min(limit);
+            limit = *y - NAME_STEP;
+        }
+        baselines
+    }
+}
+
+/// Size of a name in pixels, and from one name's line to the next.
+const NAME: f64 = 11.0;
+const NAME_STEP: f64 = 12.5;
+
+fn name(trial: &Trial) -> String {
+    format!("{} @ {}", trial.label, trial.detail)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use proptest::test_runner::{Config, TestRng, TestRunner};
+
+    #[test]
+    fn the_front_is_what_nothing_beats() {
+        let beats = |a: (f64, f64), b: (f64, f64)| a.0 <= b.0 && a.1 <= b.1 && a != b;
+        let config = Config { cases: 300, failure_persistence: None, ..Config::default() };
+        let mut runner = TestRunner::new_with_rng(config, TestRng::deterministic_rng(Default::default()));
+        let trials = proptest::collection::vec((0u8..8, 0u8..8), 0..12);
+        runner
+            .run(&trials, |trials| {
+                let trials: Vec<(f64, f64)> = trials.iter().map(|&(x, y)| (x.into(), y.into())).collect();
+                let mut twin: Vec<usize> = (0..trials.len())
+                    .filter(|&i| !trials.iter().any(|&other| beats(other, trials[i])))
+                    .filter(|&i| !trials[..i].contains(&trials[i]))
+                    .collect();
+                twin.sort_by(|&a, &b| trials[a].0.total_cmp(&trials[b].0));
+                prop_assert_eq!(pareto_front(&trials), twin);
+                Ok(())
+            })
+            .unwrap();
+    }
+
+    #[test]
+    fn trials_without_a_logarithm_are_counted_and_an_empty_chart_says_so() {
+        let frame = Frame::default();
+        let trials = [("ld:best", 0.0, 1.0), ("ld:best", 1.0, f64::NAN), ("ld:best", 1.0, -1.0)];
+        let trials = trials.map(|(name, seconds, error)| Trial::of_sampler(name, "4 spp", seconds, error));
+        let svg = pareto_chart(&frame, &trials).svg;
+        assert!(svg.contains("2 points not shown: not above 0 · 1 point not shown: not finite"), "{svg}");
+        assert!(svg.contains("no data"));
+    }
+}
