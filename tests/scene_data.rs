@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
+use sampler_lab::analytic::Penumbra;
 
 /// The scenes' names: `data/NAME/NAME.obj`.
 const SCENES: [&str; 3] = ["checkerpots", "cornell", "penumbra"];
@@ -390,20 +391,43 @@ fn materials_carry_the_published_albedos() {
 }
 
 #[test]
-fn penumbra_is_a_plane_a_strip_and_a_light_at_the_closed_form_s_numbers() {
+fn penumbra_is_the_closed_form_s_standard_scene_to_the_last_bit() {
+    let closed_form = Penumbra::standard(60, 60).unwrap();
     let objects = objects("penumbra");
     let quad = |name: &str| -> Vec<DVec3> {
         let object = objects.iter().find(|o| o.name == name && o.material == name).unwrap();
         let [first, second] = object.triangles[..] else { panic!("{object:?}") };
         vec![first.corners[0], first.corners[1], first.corners[2], second.corners[2]]
     };
-    let at = |height: f64, corners: [[f64; 2]; 4]| corners.map(|[x, z]| DVec3::new(x, height, z)).to_vec();
     assert_eq!(objects.len(), 3);
-    assert_eq!(quad("plane"), at(0.0, [[-8.0, -8.0], [-8.0, 8.0], [8.0, 8.0], [8.0, -8.0]]));
-    assert_eq!(quad("light"), at(3.0, [[-1.0, 0.0], [0.0, 0.0], [0.0, 1.0], [-1.0, 1.0]]));
-    let strip = [[-5.90625, -1.6875], [6.09375, 1.3125], [5.90625, 2.0625], [-6.09375, -0.9375]];
-    assert_eq!(quad("blocker"), at(1.0, strip));
-    for corner in ["plane", "blocker", "light"].map(quad).into_iter().flatten().flat_map(|c| c.to_array()) {
-        assert_eq!(f64::from(corner as f32), corner, "exact in f32");
+    assert_eq!(quad("light"), closed_form.light().corners);
+    assert_eq!(quad("blocker"), closed_form.blocker());
+    assert!(quad("plane").iter().all(|c| c.y == closed_form.plane().point.y));
+    assert_eq!(closed_form.plane().normal, DVec3::Y);
+    for number in ["plane", "blocker", "light"].map(quad).into_iter().flatten().flat_map(|c| c.to_array()) {
+        assert_eq!(f64::from(number as f32), number, "exact in f32");
     }
+    let material = std::fs::read_to_string(data().join("penumbra/penumbra.mtl")).unwrap();
+    assert!(material.contains(&format!("newmtl plane\nKd {0} {0} {0}\n", closed_form.plane().albedo)));
+}
+
+#[test]
+fn penumbra_s_plane_fills_the_picture_and_its_camera_is_the_closed_form_s() {
+    let closed_form = Penumbra::standard(60, 60).unwrap();
+    for (x, y) in [(0.0, 0.0), (60.0, 0.0), (0.0, 60.0), (60.0, 60.0)] {
+        let seen = closed_form.receiver(x, y).point;
+        assert!(seen.x.abs() < 8.0 && seen.z.abs() < 8.0, "{seen}");
+    }
+    let config = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/penumbra.json")).unwrap();
+    let config: serde_json::Value = serde_json::from_str(&config).unwrap();
+    let vector = |key: &str| -> Vec<f64> {
+        config["camera"][key].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+    };
+    let camera = closed_form.camera();
+    assert_eq!(vector("pos"), camera.position.to_array());
+    assert_eq!(vector("dir"), camera.direction.to_array());
+    assert_eq!(vector("up"), camera.up.to_array());
+    assert_eq!(config["camera"]["fov"].as_f64(), Some(camera.fov_y_degrees));
+    assert_eq!(config["camera"]["lens_radius"].as_f64(), Some(0.0));
+    assert_eq!(config["scene"]["materials"][0]["emissive_strength"].as_f64(), Some(closed_form.light().emission));
 }
