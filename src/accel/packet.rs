@@ -5,6 +5,41 @@ use glam::Vec3;
 use super::build::{Accel, Slot};
 use super::{Bounds, Hit, Ray, meet, reciprocal_of, slab};
 
+/// Runs a kernel compiled for the widest vectors this processor has.
+///
+/// The same source is compiled once for each width: the compiler keeps every IEEE operation and their order (it neither
+/// reassociates nor fuses), so all widths give the same bits.
+macro_rules! dispatch {
+    ($kernel:ident($accel:expr, $packet:expr)) => {{
+        #[cfg(target_arch = "x86_64")]
+        {
+            #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq")]
+            fn avx512(accel: &Accel, packet: &mut Packet) {
+                $kernel(accel, packet);
+            }
+            #[target_feature(enable = "avx2")]
+            fn avx2(accel: &Accel, packet: &mut Packet) {
+                $kernel(accel, packet);
+            }
+            if is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512vl")
+                && is_x86_feature_detected!("avx512bw")
+                && is_x86_feature_detected!("avx512dq")
+            {
+                // SAFETY: the function is safe but for needing the processor features just detected.
+                #[allow(unsafe_code, reason = "calling a function compiled for features that were detected")]
+                return unsafe { avx512($accel, $packet) };
+            }
+            if is_x86_feature_detected!("avx2") {
+                // SAFETY: as above.
+                #[allow(unsafe_code, reason = "calling a function compiled for features that were detected")]
+                return unsafe { avx2($accel, $packet) };
+            }
+        }
+        $kernel($accel, $packet)
+    }};
+}
+
 /// Rays in a packet.
 pub const LANES: usize = 16;
 
@@ -119,22 +154,32 @@ impl Packet {
     }
 }
 
+#[inline(always)]
+fn closest_with(accel: &Accel, packet: &mut Packet) {
+    accel.traverse::<false>(packet);
+}
+
+#[inline(always)]
+fn occluded_with(accel: &Accel, packet: &mut Packet) {
+    accel.traverse::<true>(packet);
+}
+
 /// Nodes waiting on the way down: one for each level of the tree, on the stack for all but degenerate trees.
 const STACK: usize = 96;
 
 impl Accel {
     /// Finds, for every ray of the packet, the nearest hit below its limit.
     pub fn closest(&self, packet: &mut Packet) {
-        self.traverse(packet, Packet::closest_of, |_| false);
+        dispatch!(closest_with(self, packet))
     }
 
     /// Finds, for every ray of the packet, whether anything lies below its limit.
     pub fn occluded(&self, packet: &mut Packet) {
-        self.traverse(packet, Packet::any_of, |p| p.limit.iter().all(|&t| t == f32::NEG_INFINITY));
+        dispatch!(occluded_with(self, packet))
     }
 
     #[inline(always)]
-    fn traverse(&self, packet: &mut Packet, test: impl Fn(&mut Packet, &Slot), done: impl Fn(&Packet) -> bool) {
+    fn traverse<const ANY: bool>(&self, packet: &mut Packet) {
         if self.nodes.is_empty() {
             return;
         }
@@ -159,9 +204,13 @@ impl Accel {
                 match node.children[side].split() {
                     Ok(slots) => {
                         for slot in &self.slots[slots] {
-                            test(packet, slot);
+                            if ANY {
+                                packet.any_of(slot);
+                            } else {
+                                packet.closest_of(slot);
+                            }
                         }
-                        if done(packet) {
+                        if ANY && packet.limit.iter().all(|&t| t == f32::NEG_INFINITY) {
                             return;
                         }
                     }
@@ -238,7 +287,10 @@ mod tests {
                 packet.set(lane, ray, *limit);
             }
             let mut shadow = packet.clone();
+            let mut portable = packet.clone();
+            closest_with(&accel, &mut portable);
             accel.closest(&mut packet);
+            assert!((0..LANES).all(|l| portable.hit(l) == packet.hit(l)), "vector widths disagree");
             accel.occluded(&mut shadow);
             for (lane, (ray, limit)) in chunk.iter().enumerate() {
                 let truth = brute_force(triangles, reach, ray, *limit);

@@ -1,0 +1,181 @@
+//! From configuration and mesh to a scene: features become types, and what is absent claims no numbers.
+
+use glam::Vec3;
+use sha2::{Digest, Sha256};
+
+use crate::accel::Accel;
+use crate::error::{Error, Result};
+use crate::sampling::{Decision, SampleLayout};
+
+use super::camera::{Aperture, Camera, PixelSample};
+use super::config::{CameraConfig, Estimator, FramebufferConfig, SceneConfig, Shading};
+use super::geometry;
+use super::light::LightSet;
+use super::load::LoadedScene;
+use super::mesh::Mesh;
+
+/// The four stages of the sheet's Figure 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// Pixel centres, albedo.
+    Start,
+    /// + a sampled place in the pixel.
+    Aa,
+    /// + the lens.
+    Dof,
+    /// + area lights: the whole scene.
+    Final,
+}
+
+impl Stage {
+    /// All stages, in the sheet's order.
+    pub const ALL: [Self; 4] = [Self::Start, Self::Aa, Self::Dof, Self::Final];
+
+    /// The word on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Start => "start",
+            Self::Aa => "aa",
+            Self::Dof => "dof",
+            Self::Final => "final",
+        }
+    }
+}
+
+/// A scene ready to render. It knows no sampler, only which decisions it makes.
+#[derive(Debug)]
+pub struct Scene {
+    /// Triangles, materials, textures.
+    pub mesh: Mesh,
+    /// Tree over the triangles.
+    pub accel: Accel,
+    /// Where rays start.
+    pub camera: Camera,
+    /// What lights there are; `None` where albedo is shown and no light is asked.
+    pub lights: Option<LightSet>,
+    /// Whether the choice among lights is divided by its probability.
+    pub estimator: Estimator,
+    /// Who reads which numbers.
+    pub layout: SampleLayout,
+    /// Things a user should hear of, among them what could not be focused on.
+    pub warnings: Vec<String>,
+    focus: Focus,
+}
+
+/// How the plane of focus came about.
+#[derive(Debug, Clone, Copy)]
+struct Focus {
+    auto: bool,
+    configured: f32,
+}
+
+/// Largest extent of a scene and distance of its camera: products of three coordinates must stay finite in f32.
+const MAX_REACH: f32 = 1e12;
+
+impl Scene {
+    /// Compiles a loaded scene for an image of `size` (columns, rows).
+    ///
+    /// # Errors
+    /// Kind `Input` where coordinates are too large for single precision.
+    pub fn new(config: &SceneConfig, mesh: Mesh, size: (u32, u32), stage: Stage) -> Result<Self> {
+        let reach = reach(&mesh, config.camera.pos);
+        if reach > MAX_REACH {
+            return Err(Error::input(
+                "scene",
+                format!("expected coordinates up to {MAX_REACH:e}, found a reach of {reach:e}"),
+            ));
+        }
+        let accel = Accel::new(&geometry::triangles(&mesh), reach);
+        let mut layout = SampleLayout::default();
+        let pixel = match stage {
+            Stage::Start => PixelSample::Center,
+            _ => PixelSample::Sampled(layout.claim_2d(Decision::Pixel)),
+        };
+        let has_lens = config.camera.lens_radius > 0.0 && matches!(stage, Stage::Dof | Stage::Final);
+        let aperture = if has_lens {
+            let lens = layout.claim_2d(Decision::Lens);
+            Aperture::ThinLens { radius: config.camera.lens_radius, focal_depth: config.camera.focal_depth, lens }
+        } else {
+            Aperture::Pinhole
+        };
+        let direct = stage == Stage::Final && config.shading == Shading::Direct;
+        let lights = direct.then(|| LightSet::new(&mesh, &mut layout));
+        let mut warnings = Vec::new();
+        if matches!(lights, Some(LightSet::Dark)) {
+            warnings.push("the scene has no light of positive power: all but emitters is black".to_owned());
+        }
+        let camera = Camera::new(&config.camera, size, pixel, aperture);
+        let focus = Focus { auto: config.auto_focus, configured: config.camera.focal_depth };
+        let mut scene = Self { mesh, accel, camera, lights, estimator: config.estimator, layout, warnings, focus };
+        scene.refocus();
+        Ok(scene)
+    }
+
+    /// Changes the image's size; with auto focus on, the plane of focus is found anew.
+    pub fn resize(&mut self, size: (u32, u32)) {
+        if size != self.camera.size() {
+            self.camera.resize(size);
+            self.refocus();
+        }
+    }
+
+    fn refocus(&mut self) {
+        let Focus { auto: true, configured } = self.focus else { return };
+        if !matches!(self.camera.aperture, Aperture::ThinLens { .. }) {
+            return;
+        }
+        let found = self.camera.auto_focus(&self.accel);
+        if found.is_none() {
+            let warning = format!("auto focus: no ray meets anything; the focal depth stays {configured}");
+            if !self.warnings.contains(&warning) {
+                self.warnings.push(warning);
+            }
+        }
+        if let Aperture::ThinLens { focal_depth, .. } = &mut self.camera.aperture {
+            *focal_depth = found.unwrap_or(configured);
+        }
+    }
+
+    /// The focal depth in use, where there is a lens.
+    pub fn focal_depth(&self) -> Option<f32> {
+        match self.camera.aperture {
+            Aperture::Pinhole => None,
+            Aperture::ThinLens { focal_depth, .. } => Some(focal_depth),
+        }
+    }
+
+    /// Bytes that triangles, tree and textures take.
+    pub fn bytes(&self) -> usize {
+        let mesh = &self.mesh;
+        self.accel.bytes()
+            + size_of_val(mesh.positions.as_slice())
+            + size_of_val(mesh.normals.as_slice())
+            + size_of_val(mesh.uvs.as_slice())
+            + mesh.textures.iter().map(|t| t.width as usize * t.height as usize * 12).sum::<usize>()
+    }
+}
+
+/// Bound for coordinates and distances of everything a ray can start from or meet.
+fn reach(mesh: &Mesh, eye: Vec3) -> f32 {
+    let largest = mesh.positions.iter().flatten().fold(eye.abs(), |m, p| m.max(p.abs())).max_element();
+    2.0 * largest
+}
+
+/// Hash of everything that decides a scene's picture but for what an experiment sets itself (size, samples, exposure,
+/// estimator): SHA-256 of the full configuration and of every file read, in hex.
+pub fn content_hash(loaded: &LoadedScene) -> String {
+    let mut config = loaded.config.clone();
+    config.framebuffer = FramebufferConfig::default();
+    config.estimator = Estimator::Unbiased;
+    let mut hash = Sha256::new();
+    hash.update(config.to_json());
+    for input in &loaded.inputs {
+        hash.update(input.sha256.as_bytes());
+    }
+    hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// A camera configuration for scenes built in memory: at `pos`, looking along `dir`, pinhole.
+pub fn pinhole_at(pos: Vec3, dir: Vec3, up: Vec3, fov_degrees: f32) -> CameraConfig {
+    CameraConfig { pos, dir, up, fov_degrees, lens_radius: 0.0, focal_depth: 1.0 }
+}

@@ -1,0 +1,274 @@
+//! Area lights: parallelograms and meshes, and the choice among them.
+
+use glam::{Vec2, Vec3};
+
+use crate::sampling::{Decision, Dim1, Dim2, SampleLayout, warp};
+
+use super::geometry::{area, face_normal, offset_length};
+use super::mesh::Mesh;
+
+/// Relative luminance of linear Rec. 709 RGB.
+pub fn luma(c: Vec3) -> f32 {
+    0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z
+}
+
+/// A point of a light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LightPoint {
+    /// Position, a hair's breadth in front of the surface so that a ray to it does not meet the light itself.
+    pub position: Vec3,
+    /// Unit normal; light leaves on this side.
+    pub normal: Vec3,
+}
+
+/// One light: all emissive triangles of one material in one file.
+#[derive(Debug, Clone)]
+pub struct Light {
+    /// The material's name.
+    pub name: String,
+    /// Emitted radiance.
+    pub emission: Vec3,
+    /// Surface area; points are uniform on it: `pdf_area` = 1/area.
+    pub area: f32,
+    /// area × luma(emission): what lights are chosen by.
+    pub power: f64,
+    shape: Shape,
+}
+
+#[derive(Debug, Clone)]
+enum Shape {
+    Parallelogram {
+        corner: Vec3,
+        e1: Vec3,
+        e2: Vec3,
+        normal: Vec3,
+    },
+    /// Triangles with the cumulative share of the area up to and including each.
+    Mesh {
+        triangles: Vec<MeshTriangle>,
+    },
+}
+
+#[derive(Debug, Clone)]
+struct MeshTriangle {
+    corners: [Vec3; 3],
+    normal: Vec3,
+    offset: f32,
+    share_before: f32,
+    share_after: f32,
+}
+
+impl Light {
+    /// A light of these triangles; two that make a parallelogram are sampled as one. `None` where they have no area.
+    pub fn new(name: String, emission: Vec3, triangles: &[[Vec3; 3]]) -> Option<Self> {
+        let triangles: Vec<_> =
+            triangles.iter().copied().filter(|t| area(t) > 0.0 && face_normal(t) != Vec3::ZERO).collect();
+        let total: f64 = triangles.iter().map(area).sum();
+        if total <= 0.0 {
+            return None;
+        }
+        let shape = parallelogram(&triangles).unwrap_or_else(|| {
+            let mut before = 0.0;
+            let parts = triangles.iter().map(|corners| {
+                let share_before = (before / total) as f32;
+                before += area(corners);
+                MeshTriangle {
+                    corners: *corners,
+                    normal: face_normal(corners),
+                    offset: offset_length(corners),
+                    share_before,
+                    share_after: (before / total) as f32,
+                }
+            });
+            Shape::Mesh { triangles: parts.collect() }
+        });
+        let power = total * f64::from(luma(emission));
+        Some(Self { name, emission, area: total as f32, power, shape })
+    }
+
+    /// Whether two triangles were recognised as one parallelogram.
+    pub fn is_parallelogram(&self) -> bool {
+        matches!(self.shape, Shape::Parallelogram { .. })
+    }
+
+    /// The point that `u` in [0, 1)² names; uniform by area.
+    ///
+    /// A mesh takes its triangle from `u.x` and stretches what is left of it over that triangle, so one 2-D decision serves.
+    #[inline]
+    pub fn point(&self, u: Vec2) -> LightPoint {
+        match &self.shape {
+            Shape::Parallelogram { corner, e1, e2, normal } => {
+                LightPoint { position: warp::square_to_parallelogram(u, *corner, *e1, *e2), normal: *normal }
+            }
+            Shape::Mesh { triangles } => {
+                let index = triangles.partition_point(|t| t.share_after <= u.x).min(triangles.len() - 1);
+                let t = &triangles[index];
+                let x = ((u.x - t.share_before) / (t.share_after - t.share_before)).clamp(0.0, 1.0);
+                let b = warp::square_to_triangle(Vec2::new(x, u.y));
+                let position = t.corners[0] * b.x + t.corners[1] * b.y + t.corners[2] * b.z;
+                LightPoint { position: position + t.normal * t.offset, normal: t.normal }
+            }
+        }
+    }
+}
+
+/// Two triangles that share a diagonal, wind alike and are congruent: p, s₁, q, s₂ with p + q = s₁ + s₂.
+fn parallelogram(triangles: &[[Vec3; 3]]) -> Option<Shape> {
+    let [first, second] = triangles else { return None };
+    let own = (0..3).find(|&i| !second.contains(&first[i]))?;
+    let (p, s1, s2) = (first[own], first[(own + 1) % 3], first[(own + 2) % 3]);
+    let q = *second.iter().find(|v| !first.contains(v))?;
+    let size = (s1 - p).abs().max((s2 - p).abs()).max_element();
+    let closes = (p + q - s1 - s2).abs().max_element() <= 1e-5 * size;
+    let shares = second.contains(&s1) && second.contains(&s2);
+    let normal = face_normal(first);
+    if !closes || !shares || normal.dot(face_normal(second)) <= 0.0 {
+        return None;
+    }
+    let offset = offset_length(first).max(offset_length(second));
+    Some(Shape::Parallelogram { corner: p + normal * offset, e1: s1 - p, e2: s2 - p, normal })
+}
+
+/// The lights of a scene, and what choosing among them takes.
+#[derive(Debug)]
+pub enum LightSet {
+    /// No light: nothing to decide.
+    Dark,
+    /// One light: nothing to choose.
+    One {
+        /// The light.
+        light: Light,
+        /// Where on it.
+        point: Dim2,
+    },
+    /// Several lights, chosen by power.
+    Many {
+        /// Lights of positive power.
+        lights: Vec<Light>,
+        /// Probability of each.
+        pmf: Vec<f32>,
+        /// Cumulative probability up to and including each.
+        cumulative: Vec<f64>,
+        /// Which light.
+        pick: Dim1,
+        /// Where on it.
+        point: Dim2,
+    },
+}
+
+impl LightSet {
+    /// Collects the emitters of a mesh, in the order of their materials, and claims what they need.
+    ///
+    /// A light of power zero is never chosen, so it is left out.
+    pub fn new(mesh: &Mesh, layout: &mut SampleLayout) -> Self {
+        let mut triangles: Vec<Vec<[Vec3; 3]>> = vec![Vec::new(); mesh.materials.len()];
+        for (corners, &material) in mesh.positions.iter().zip(&mesh.material_of) {
+            if mesh.materials[material as usize].is_emitter {
+                triangles[material as usize].push(*corners);
+            }
+        }
+        let mut lights: Vec<Light> = mesh
+            .materials
+            .iter()
+            .zip(&triangles)
+            .filter_map(|(m, t)| Light::new(m.name.clone(), m.emission, t))
+            .filter(|light| light.power > 0.0)
+            .collect();
+        match lights.len() {
+            0 => Self::Dark,
+            1 => Self::One { light: lights.remove(0), point: layout.claim_2d(Decision::LightPoint) },
+            _ => {
+                // Scaled by the largest first: the sum of finite powers may overflow otherwise.
+                let largest = lights.iter().map(|l| l.power).fold(0.0, f64::max);
+                let total: f64 = lights.iter().map(|l| l.power / largest).sum();
+                let share = |l: &Light| l.power / largest / total;
+                let mut sum = 0.0;
+                let mut cumulative: Vec<f64> = lights
+                    .iter()
+                    .map(|l| {
+                        sum += share(l);
+                        sum
+                    })
+                    .collect();
+                // Rounding must not leave a gap at the end: the last light takes it.
+                *cumulative.last_mut().expect("there are lights") = 1.0;
+                let pmf = lights.iter().map(|l| share(l) as f32).collect();
+                let pick = layout.claim_1d(Decision::LightPick);
+                Self::Many { lights, pmf, cumulative, pick, point: layout.claim_2d(Decision::LightPoint) }
+            }
+        }
+    }
+
+    /// All lights, in order.
+    pub fn lights(&self) -> &[Light] {
+        match self {
+            Self::Dark => &[],
+            Self::One { light, .. } => std::slice::from_ref(light),
+            Self::Many { lights, .. } => lights,
+        }
+    }
+}
+
+/// Index of the light that `u` in [0, 1) picks from cumulative probabilities that end in 1.
+#[inline]
+pub fn pick_light(cumulative: &[f64], u: f32) -> usize {
+    cumulative.partition_point(|&c| c <= f64::from(u))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn quad() -> [[Vec3; 3]; 2] {
+        let at = |x: f32, y: f32| Vec3::new(x, y, 1.0);
+        [[at(0.0, 0.0), at(2.0, 0.0), at(3.0, 1.0)], [at(0.0, 0.0), at(3.0, 1.0), at(1.0, 1.0)]]
+    }
+
+    #[test]
+    fn two_triangles_that_make_a_parallelogram_are_one() {
+        for turn in 0..3 {
+            let mut t = quad();
+            t[0].rotate_left(turn);
+            t[1].rotate_right(turn);
+            let light = Light::new("l".into(), Vec3::ONE, &t).unwrap();
+            assert!(light.is_parallelogram());
+            assert_eq!(light.area, 2.0);
+            let middle = light.point(Vec2::splat(0.5));
+            assert!((middle.position - Vec3::new(1.5, 0.5, 1.0)).length() < 1e-4);
+            assert!((middle.normal - Vec3::Z).length() < 1e-6);
+        }
+        let mut bent = quad();
+        bent[1][2].z = 1.2;
+        assert!(!Light::new("l".into(), Vec3::ONE, &bent).unwrap().is_parallelogram());
+        let mut flipped = quad();
+        flipped[1].swap(0, 1);
+        assert!(!Light::new("l".into(), Vec3::ONE, &flipped).unwrap().is_parallelogram());
+        assert!(Light::new("l".into(), Vec3::ONE, &[[Vec3::X; 3]]).is_none());
+    }
+
+    /// Midpoint rule over the unit square: the mean point of a mesh light is its centroid.
+    #[test]
+    fn a_mesh_light_is_sampled_by_area() {
+        let at = |x: f32, y: f32| Vec3::new(x, y, 0.0);
+        let triangles = [[at(0.0, 0.0), at(4.0, 0.0), at(0.0, 3.0)], [at(10.0, 0.0), at(11.0, 0.0), at(10.0, 1.0)]];
+        let light = Light::new("l".into(), Vec3::ONE, &triangles).unwrap();
+        assert_eq!(light.area, 6.5);
+        let k = 256;
+        let mut mean = glam::DVec3::ZERO;
+        for i in 0..k * k {
+            let u = Vec2::new(((i % k) as f32 + 0.5) / k as f32, ((i / k) as f32 + 0.5) / k as f32);
+            mean += light.point(u).position.as_dvec3() / f64::from(k * k);
+        }
+        let exact = (glam::DVec3::new(4.0, 3.0, 0.0) / 3.0 * 6.0 + glam::DVec3::new(31.0, 1.0, 0.0) / 3.0 * 0.5) / 6.5;
+        // The column of cells in which one triangle gives way to the other errs by up to 1/k of the distance between them.
+        assert!((mean - exact).length() < 10.0 / f64::from(k), "{mean} {exact}");
+    }
+
+    #[test]
+    fn the_largest_number_below_one_picks_the_last_light_and_zero_the_first() {
+        let cumulative = [0.25, 0.5, 1.0];
+        assert_eq!(pick_light(&cumulative, 0.0), 0);
+        assert_eq!(pick_light(&cumulative, 0.25), 1);
+        assert_eq!(pick_light(&cumulative, 1.0 - f32::EPSILON / 2.0), 2);
+    }
+}
