@@ -8,12 +8,13 @@ use sampler_lab::error::{Error, Result};
 use sampler_lab::film::Image;
 use sampler_lab::report::bias_variance::{BiasVariance, Estimate, Group, bias_variance_chart};
 use sampler_lab::report::figure::Rgb8;
+use sampler_lab::report::frame::Frame;
 use sampler_lab::report::pareto::{Trial, pareto_chart};
 use sampler_lab::report::pictures::{
     Crop, NamedPoints, SHEET_DOT, SHEET_PANEL, ScaleBar, StripCell, StripLayout, error_map, error_scale,
     point_set_contact_sheet, point_set_panel, strip,
 };
-use sampler_lab::report::plots::{Datum, Floor, Frame, Guide, Plot, Series, loglog_chart, small_multiples};
+use sampler_lab::report::plots::{Datum, Floor, Guide, Plot, Series, loglog_chart, small_multiples};
 
 const FAMILIES: [&str; 5] = ["uniform", "stratified", "halton", "hammersley", "ld"];
 const SPP: [f64; 6] = [1.0, 4.0, 16.0, 26.0, 64.0, 256.0];

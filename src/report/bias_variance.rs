@@ -1,10 +1,12 @@
 //! Bias² beside variance, sampler by sampler: which part of the error more samples will not cure.
 
-use super::axis::{LogAxis, number_label};
-use super::figure::{Align, Bounds, Colour, Dash, Drawing, Figure, PAGE_WIDTH, Place, Text, shortened, text_width};
-use super::labels::kept_apart;
-use super::plots::{Frame, Header, SMALL, TICK, TITLE};
-use super::style::{GREY, GRID, INK, Marker, PALE, Style, draw_marker, style_of};
+use super::axis::LogAxis;
+use super::figure::{Align, Bounds, Colour, Dash, Drawing, Figure, PAGE_WIDTH, Place, shortened, text_width};
+use super::frame::{
+    FOOT, Frame, HEADING, Header, SMALL, TICK, draw_axis_names, draw_corner, draw_no_data, draw_small_x_ticks,
+    draw_x_grid,
+};
+use super::style::{GREY, INK, Marker, Style, draw_marker, style_of};
 
 /// An estimate that may come out at or below 0, where noise is larger than what is estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,7 +49,7 @@ pub struct Group {
 const ROW: f64 = 25.0;
 /// Every second row stands on it.
 const STRIPE: Colour = [245; 3];
-const HEADING: f64 = 26.0;
+const HEADING_STEP: f64 = 26.0;
 const BIAS: Style = Style { colour: [213, 94, 0], marker: Marker::Diamond, filled: true, dash: Dash::Solid };
 const VARIANCE: Style = Style { colour: [0, 114, 178], marker: Marker::Circle, filled: true, dash: Dash::Solid };
 /// Width of the strip at the left in which estimates at or below 0 are noted.
@@ -69,22 +71,24 @@ fn drawn(frame: &Frame, groups: &[Group]) -> Drawing {
     let widest = rows.clone().map(|row| text_width(&row.label, SMALL, false)).fold(60.0, f64::max).min(220.0);
     let header = Header::new(frame, &[]);
     let headings = groups.iter().filter(|group| !group.title.is_empty()).count() as f64;
-    let body = (rows.clone().count() as f64 * ROW + headings * HEADING).max(60.0) + 8.0;
+    let body = (rows.clone().count() as f64 * ROW + headings * HEADING_STEP).max(60.0) + 8.0;
     let top = header.height + 24.0;
-    let mut drawing = Drawing::new(PAGE_WIDTH, top + body + 46.0);
+    let mut drawing = Drawing::new(PAGE_WIDTH, top + body + FOOT);
     header.draw(&mut drawing);
     let b = Bounds { left: 12.0 + 20.0 + widest + 12.0, top, right: PAGE_WIDTH - 24.0, bottom: top + body };
     draw_key_line(&mut drawing, b.left, header.height + 6.0);
     let axis = LogAxis::around(rows.flat_map(ends), 0.04, b.left + BELOW, b.right);
     draw_stripes(&mut drawing, groups, &b);
-    draw_frame(&mut drawing, &axis, &b, &frame.x_label);
+    draw_x_grid(&mut drawing, &b, &axis, &axis.ticks(10), true);
+    draw_small_x_ticks(&mut drawing, &b, &axis);
+    draw_corner(&mut drawing, &b);
+    drawing.text((b.left + BELOW / 2.0 - 2.0, b.bottom + 17.0), "≤ 0", TICK, GREY, Align::Centre);
+    draw_axis_names(&mut drawing, &b, &Frame { y_label: String::new(), ..frame.clone() });
     let mut y = b.top + 4.0;
     for group in groups {
         if !group.title.is_empty() {
-            let text = shortened(&group.title, 13.0, true, b.left - 24.0);
-            let at = (12.0, y + 18.0);
-            drawing.add_text(Text { at, text, size: 13.0, bold: true, colour: INK, align: Align::Left, turned: false });
-            y += HEADING;
+            drawing.heading((12.0, y + 18.0), &shortened(&group.title, HEADING, true, b.left - 24.0));
+            y += HEADING_STEP;
         }
         for row in &group.rows {
             draw_row(&mut drawing, &axis, &b, row, y + ROW / 2.0, widest);
@@ -92,7 +96,7 @@ fn drawn(frame: &Frame, groups: &[Group]) -> Drawing {
         }
     }
     if y < b.top + ROW {
-        drawing.text(((b.left + b.right) / 2.0, (b.top + b.bottom) / 2.0 + 5.0), "no data", TITLE, GREY, Align::Centre);
+        draw_no_data(&mut drawing, &b);
     }
     drawing
 }
@@ -100,7 +104,7 @@ fn drawn(frame: &Frame, groups: &[Group]) -> Drawing {
 fn draw_stripes(drawing: &mut Drawing, groups: &[Group], b: &Bounds) {
     let mut top = b.top + 4.0;
     for group in groups {
-        top += if group.title.is_empty() { 0.0 } else { HEADING };
+        top += if group.title.is_empty() { 0.0 } else { HEADING_STEP };
         for i in (0..group.rows.len()).step_by(2) {
             let y = top + i as f64 * ROW;
             drawing.rectangle(Bounds { left: 12.0, top: y, right: b.right, bottom: y + ROW }, STRIPE, 1.0);
@@ -138,24 +142,6 @@ fn draw_key_line(drawing: &mut Drawing, left: f64, y: f64) {
         GREY,
         Align::Left,
     );
-}
-
-fn draw_frame(drawing: &mut Drawing, axis: &LogAxis, b: &Bounds, name: &str) {
-    let ticks = axis.ticks(10);
-    let spans: Vec<(f64, f64)> =
-        ticks.iter().map(|&t| (axis.pixel(t), text_width(&number_label(t), TICK, false))).collect();
-    for ((&tick, &(x, _)), shown) in ticks.iter().zip(&spans).zip(kept_apart(&spans, 6.0)) {
-        drawing.line(&[(x, b.top), (x, b.bottom)], 1.0, GRID, Dash::Solid);
-        if shown {
-            drawing.text((x, b.bottom + 17.0), &number_label(tick), TICK, GREY, Align::Centre);
-        }
-    }
-    for x in axis.small_ticks().into_iter().map(|tick| axis.pixel(tick)) {
-        drawing.line(&[(x, b.bottom - 3.0), (x, b.bottom)], 1.0, PALE, Dash::Solid);
-    }
-    drawing.line(&[(b.left, b.top), (b.left, b.bottom), (b.right, b.bottom)], 1.0, PALE, Dash::Solid);
-    drawing.text((b.left + BELOW / 2.0 - 2.0, b.bottom + 17.0), "≤ 0", TICK, GREY, Align::Centre);
-    drawing.text(((b.left + b.right) / 2.0, b.bottom + 36.0), name, SMALL, INK, Align::Centre);
 }
 
 fn draw_row(drawing: &mut Drawing, axis: &LogAxis, b: &Bounds, row: &BiasVariance, y: f64, width: f64) {
@@ -229,5 +215,20 @@ mod tests {
     fn without_rows_the_chart_says_no_data() {
         assert!(chart(vec![]).svg.contains("no data"));
         assert!(bias_variance_chart(&Frame::default(), &[]).svg.contains("no data"));
+    }
+
+    #[test]
+    fn thirty_rows_of_any_size_stay_legible() {
+        let row = |i: i32| {
+            let value = libm::pow(10.0, f64::from(i) * 0.5 - 12.0) * if i % 3 == 0 { -1.0 } else { 1.0 };
+            let variance = (i % 4 != 0).then(|| estimate(value.abs(), value.abs() / 2.0, 2.0 * value.abs()));
+            BiasVariance::of_sampler("halton:joint:digits@each", estimate(value, -1e-9, 2.0 * value), variance)
+        };
+        let group = |title: &str| Group { title: title.to_owned(), rows: (0..30).map(row).collect() };
+        drawn(
+            &Frame::default(),
+            &[group("a01"), group(""), group("a scene with a very long name indeed, wider than the labels")],
+        )
+        .assert_legible();
     }
 }

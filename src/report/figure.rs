@@ -264,6 +264,20 @@ impl Drawing {
         self.add_text(Text { at, text: text.to_owned(), size, bold: false, colour, align, turned: false });
     }
 
+    /// Bold text over a part of the page.
+    pub fn heading(&mut self, at: Place, text: &str) {
+        let (text, colour) = (text.to_owned(), super::style::INK);
+        self.add_text(Text {
+            at,
+            text,
+            size: super::frame::HEADING,
+            bold: true,
+            colour,
+            align: Align::Left,
+            turned: false,
+        });
+    }
+
     pub fn add_text(&mut self, text: Text) {
         if !text.text.is_empty() {
             self.marks.push(Mark::Text(text));
@@ -544,6 +558,30 @@ fn extra_attribute(mark: &Mark) -> String {
 
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+impl Drawing {
+    /// Fails where a text overlaps another or leaves the page, or a mark is off the page or not finite.
+    pub fn assert_legible(&self) {
+        let page = Bounds { left: -0.5, top: -0.5, right: self.width + 0.5, bottom: self.height + 0.5 };
+        let mut texts: Vec<(&str, Bounds)> = Vec::new();
+        for mark in &self.marks {
+            match mark {
+                Mark::Text(text) => {
+                    let bounds = text.bounds();
+                    assert!(bounds.inside(&page), "{:?} leaves the page: {bounds:?}", text.text);
+                    let other = texts.iter().find(|(_, other)| other.overlaps(&bounds));
+                    assert!(other.is_none(), "{:?} {bounds:?} overlaps {other:?}", text.text);
+                    texts.push((&text.text, bounds));
+                }
+                Mark::Line { points, .. } | Mark::Area { points, .. } => {
+                    let on_page = |&(x, y): &Place| (0.0..=self.width).contains(&x) && (0.0..=self.height).contains(&y);
+                    assert!(points.iter().all(on_page), "{points:?} leaves the page");
+                }
+            }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Reports: figures, tables and sentences out of rows.
 pub mod bias_variance;
 pub mod figure;
+pub mod frame;
 pub mod pareto;
 pub mod pictures;
 pub mod plots;
@@ -8,3 +9,4 @@ pub mod style;
 
 mod axis;
 mod labels;
+mod legend;

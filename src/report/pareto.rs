@@ -1,10 +1,13 @@
 //! Speed against accuracy: seconds and error of every sampler and count, and which of them nothing beats at both.
 
-use super::axis::{LogAxis, number_label};
+use super::axis::LogAxis;
 use super::figure::{Align, Bounds, Dash, Drawing, Figure, PAGE_WIDTH, Place, Text, shortened, text_width};
-use super::labels::kept_apart;
-use super::plots::{Frame, Header, KEY, LeftOut, SMALL, TICK, TITLE};
-use super::style::{GREY, GRID, INK, PALE, Style, draw_key, draw_marker, lightened, style_of};
+use super::frame::{
+    FOOT, Frame, Header, LeftOut, SMALL, draw_axis_names, draw_corner, draw_no_data, draw_small_x_ticks, draw_x_grid,
+    draw_y_grid, left_margin,
+};
+use super::legend::KEY;
+use super::style::{GREY, INK, PALE, Style, draw_key, draw_marker, lightened, style_of};
 
 /// One sampler at one count: what it cost and how far off it was.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,17 +65,18 @@ fn drawn(frame: &Frame, trials: &[Trial]) -> Drawing {
         trials.iter().filter(|trial| left_out.admits(&[trial.seconds, trial.error])).map(cleaned).collect();
     let header = Header::new(frame, &[left_out.note()]);
     let labels = legend(&trials);
-    let widest = labels.iter().map(|(label, _)| text_width(label, SMALL, false)).fold(60.0, f64::max).min(200.0);
-    let height = header.height + 440.0_f64.max(20.0 * (labels.len() + 2) as f64) + 46.0;
-    let mut drawing = Drawing::new(PAGE_WIDTH, height);
+    let widest = labels.iter().map(|(label, _)| text_width(label, SMALL, false)).fold(100.0, f64::max).min(200.0);
+    let front = pareto_front(&trials.iter().map(|t| (t.seconds, t.error)).collect::<Vec<_>>());
+    let body = 440.0_f64.max(20.0 * (labels.len() + 3) as f64).max(NAME_STEP * (front.len() + 4) as f64);
+    let mut drawing = Drawing::new(PAGE_WIDTH, header.height + body + FOOT);
     header.draw(&mut drawing);
     let bounds = Bounds {
-        left: 80.0,
+        left: left_margin(&axis_of(&errors(&trials), 0.0, 1.0).ticks(9)),
         top: header.height,
         right: PAGE_WIDTH - widest - KEY - 32.0,
-        bottom: drawing.height - 46.0,
+        bottom: drawing.height - FOOT,
     };
-    let chart = Chart::new(&trials, bounds);
+    let chart = Chart::new(&trials, front, bounds);
     chart.draw_frame(&mut drawing, frame);
     draw_legend(&mut drawing, &labels, (bounds.right + 16.0, bounds.top + 8.0), widest);
     chart.draw(&mut drawing);
@@ -110,6 +114,7 @@ fn draw_legend(drawing: &mut Drawing, labels: &[(String, Style)], (left, top): P
         let step = [(left, y - 5.0), (left + KEY / 2.0, y - 5.0), (left + KEY / 2.0, y + 5.0), (left + KEY, y + 5.0)];
         drawing.line(&step, 1.6, INK, Dash::Solid);
         drawing.text((left + KEY + 6.0, y + 4.0), "Pareto front", SMALL, INK, Align::Left);
+        drawing.text((left + KEY + 6.0, y + 20.0), "light: beaten by it", SMALL, GREY, Align::Left);
     }
 }
 
@@ -120,6 +125,10 @@ struct Chart<'a> {
     x: LogAxis,
     y: LogAxis,
     b: Bounds,
+}
+
+fn errors(trials: &[Trial]) -> Vec<(f64, Option<(f64, f64)>)> {
+    trials.iter().map(|t| (t.error, t.error_interval)).collect()
 }
 
 /// How far an interval may widen the axes beyond the values.
@@ -135,13 +144,11 @@ fn axis_of(values: &[(f64, Option<(f64, f64)>)], from: f64, to: f64) -> LogAxis 
 
 impl<'a> Chart<'a> {
     /// Leaves room for names at the left, and below where the names run over the bottom.
-    fn new(trials: &'a [Trial], b: Bounds) -> Self {
-        let front = pareto_front(&trials.iter().map(|t| (t.seconds, t.error)).collect::<Vec<_>>());
+    fn new(trials: &'a [Trial], front: Vec<usize>, b: Bounds) -> Self {
         let seconds: Vec<_> = trials.iter().map(|t| (t.seconds, t.seconds_interval)).collect();
-        let errors: Vec<_> = trials.iter().map(|t| (t.error, t.error_interval)).collect();
         let widest = front.iter().map(|&i| text_width(&name(&trials[i]), NAME, false)).fold(0.0, f64::max);
-        let x = axis_of(&seconds, b.left + widest.min(0.4 * (b.right - b.left)), b.right);
-        let y = axis_of(&errors, b.bottom - NAME_STEP, b.top);
+        let x = axis_of(&seconds, b.left + widest.min(NAME_SHARE * (b.right - b.left)) + 10.0, b.right);
+        let y = axis_of(&errors(trials), b.bottom - NAME_STEP, b.top);
         Self { trials, front, x, y, b }
     }
 
@@ -150,38 +157,16 @@ impl<'a> Chart<'a> {
     }
 
     fn draw_frame(&self, drawing: &mut Drawing, frame: &Frame) {
-        let b = self.b;
-        for tick in self.y.ticks(9) {
-            let y = self.y.pixel(tick);
-            drawing.line(&[(b.left, y), (b.right, y)], 1.0, GRID, Dash::Solid);
-            drawing.text((b.left - 7.0, y + 4.0), &number_label(tick), TICK, GREY, Align::Right);
-        }
-        let ticks = self.x.ticks(9);
-        let spans: Vec<(f64, f64)> =
-            ticks.iter().map(|&t| (self.x.pixel(t), text_width(&number_label(t), TICK, false))).collect();
-        for ((&tick, &(x, _)), shown) in ticks.iter().zip(&spans).zip(kept_apart(&spans, 6.0)) {
-            drawing.line(&[(x, b.top), (x, b.bottom)], 1.0, GRID, Dash::Solid);
-            if shown {
-                drawing.text((x, b.bottom + 17.0), &number_label(tick), TICK, GREY, Align::Centre);
-            }
-        }
-        for x in self.x.small_ticks().into_iter().map(|tick| self.x.pixel(tick)) {
-            drawing.line(&[(x, b.bottom - 3.0), (x, b.bottom)], 1.0, PALE, Dash::Solid);
-        }
-        for y in self.y.small_ticks().into_iter().map(|tick| self.y.pixel(tick)) {
-            drawing.line(&[(b.left, y), (b.left + 3.0, y)], 1.0, PALE, Dash::Solid);
-        }
-        drawing.line(&[(b.left, b.top), (b.left, b.bottom), (b.right, b.bottom)], 1.0, PALE, Dash::Solid);
-        drawing.text(((b.left + b.right) / 2.0, b.bottom + 36.0), &frame.x_label, SMALL, INK, Align::Centre);
-        let at = (10.0 + 0.76 * SMALL, (b.top + b.bottom) / 2.0);
-        let text = shortened(&frame.y_label, SMALL, false, b.bottom - b.top);
-        drawing.add_text(Text { at, text, size: SMALL, bold: false, colour: INK, align: Align::Centre, turned: true });
+        draw_y_grid(drawing, &self.b, &self.y, &self.y.ticks(9), true);
+        draw_x_grid(drawing, &self.b, &self.x, &self.x.ticks(9), true);
+        draw_small_x_ticks(drawing, &self.b, &self.x);
+        draw_corner(drawing, &self.b);
+        draw_axis_names(drawing, &self.b, frame);
     }
 
     fn draw(&self, drawing: &mut Drawing) {
         if self.trials.is_empty() {
-            let middle = ((self.b.left + self.b.right) / 2.0, (self.b.top + self.b.bottom) / 2.0);
-            drawing.text(middle, "no data", TITLE, GREY, Align::Centre);
+            draw_no_data(drawing, &self.b);
             return;
         }
         for (label, style) in legend(self.trials) {
@@ -194,10 +179,10 @@ impl<'a> Chart<'a> {
             self.draw_trial(drawing, &self.trials[i], 0.55);
         }
         self.draw_front(drawing);
+        self.draw_names(drawing);
         for &i in &front {
             self.draw_trial(drawing, &self.trials[i], 0.0);
         }
-        self.draw_names(drawing);
     }
 
     /// A marker with its intervals as a cross of bars; `light` moves its colours towards white.
@@ -229,7 +214,8 @@ impl<'a> Chart<'a> {
     /// Names the members of the front. Below and left of it nothing stands, by its definition: each name goes there, right
     /// of nothing but its own marker, as high as the names before it allow; so no name or leader crosses another.
     fn draw_names(&self, drawing: &mut Drawing) {
-        let names: Vec<String> = self.front.iter().map(|&i| name(&self.trials[i])).collect();
+        let room = NAME_SHARE * (self.b.right - self.b.left);
+        let names = self.front.iter().map(|&i| shortened(&name(&self.trials[i]), NAME, false, room));
         for ((&i, name), baseline) in self.front.iter().zip(names).zip(self.baselines()) {
             let (x, y) = self.place(&self.trials[i]);
             let reach = |t: &Trial| t.seconds_interval.map_or(t.seconds, |(low, _)| low.min(t.seconds));
@@ -284,6 +270,8 @@ impl<'a> Chart<'a> {
 /// Size of a name in pixels, and from one name's line to the next.
 const NAME: f64 = 11.0;
 const NAME_STEP: f64 = 12.5;
+/// Names take at most this share of the plot's width.
+const NAME_SHARE: f64 = 0.4;
 
 fn name(trial: &Trial) -> String {
     format!("{} @ {}", trial.label, trial.detail)
@@ -323,5 +311,43 @@ mod tests {
         let svg = pareto_chart(&frame, &trials).svg;
         assert!(svg.contains("2 points not shown: not above 0 · 1 point not shown: not finite"), "{svg}");
         assert!(svg.contains("no data"));
+    }
+
+    #[test]
+    fn names_on_the_front_keep_apart_and_on_the_page() {
+        let config = Config { cases: 80, failure_persistence: None, ..Config::default() };
+        let mut runner = TestRunner::new_with_rng(config, TestRng::deterministic_rng(Default::default()));
+        let name =
+            prop::sample::select(&["ld:best", "uniform:sheet", "halton:joint:digits@each, lens by sobol:best"][..]);
+        let trial = (name, 0u32..20, -3.0..2.0f64, -12.0..3.0f64, prop::option::of(0.0..2.0f64));
+        let trials = proptest::collection::vec(trial, 0..60);
+        runner
+            .run(&trials, |trials| {
+                let trials: Vec<Trial> = trials
+                    .into_iter()
+                    .map(|(name, k, seconds, error, spread)| {
+                        let (seconds, error) = (libm::pow(10.0, seconds), libm::pow(10.0, error));
+                        let interval = |v: f64| spread.map(|s| (v * (1.0 - s), v * (1.0 + s)));
+                        Trial {
+                            seconds_interval: interval(seconds),
+                            error_interval: interval(error),
+                            ..Trial::of_sampler(name, &format!("{k} spp"), seconds, error)
+                        }
+                    })
+                    .collect();
+                drawn(&Frame::default(), &trials).assert_legible();
+                Ok(())
+            })
+            .unwrap();
+    }
+
+    #[test]
+    fn a_front_of_forty_members_has_forty_names() {
+        let trial = |i: i32| {
+            Trial::of_sampler("ld:best", &format!("{i} spp"), 1.01 + 1e-3 * f64::from(i), 2.0 - 1e-3 * f64::from(i))
+        };
+        let drawing = drawn(&Frame::default(), &(0..40).map(trial).collect::<Vec<_>>());
+        drawing.assert_legible();
+        assert_eq!(drawing.finish("").svg.matches("ld:best @").count(), 40);
     }
 }

@@ -5,7 +5,7 @@ use crate::film::Image;
 
 use super::axis::number_label;
 use super::figure::{Align, Colour, Drawing, Mark, PAGE_WIDTH, Rgb8, Text, shortened, wrapped};
-use super::plots::SMALL;
+use super::frame::SMALL;
 use super::style::{GREY, INK, lightened};
 
 /// Edge of the sheet's Figure 2, in pixels.

@@ -3,11 +3,14 @@
 //! Points that a logarithm cannot show are left out and counted under the title, never moved or dropped in silence.
 
 use super::axis::{LogAxis, number_label};
-use super::figure::{
-    Align, Bounds, Colour, Dash, Drawing, Figure, PAGE_WIDTH, Place, Text, shortened, text_width, wrapped,
+use super::figure::{Align, Bounds, Dash, Drawing, Figure, PAGE_WIDTH, Place, Text, shortened, text_width};
+use super::frame::{
+    FOOT, Frame, HEADING, Header, LeftOut, SMALL, draw_axis_names, draw_corner, draw_no_data, draw_x_grid, draw_y_grid,
+    left_margin,
 };
-use super::labels::{first_free, kept_apart, spread};
-use super::style::{GREY, GRID, INK, PALE, Style, draw_key, draw_marker, lightened, style_of};
+use super::labels::first_free;
+use super::legend::{Ending, KEY, LABEL_STEP, LEADER, Legend, draw_column};
+use super::style::{GREY, PALE, Style, draw_marker, lightened, style_of};
 
 /// One measured value of a series.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,32 +72,6 @@ pub struct Plot {
     pub floor: Option<Floor>,
 }
 
-/// What a chart of [`Plot`]s says around them.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Frame {
-    /// First line, bold.
-    pub title: String,
-    /// Second line: metric, n, scene, replicates, level.
-    pub subtitle: String,
-    /// Quantity and unit of the horizontal axis.
-    pub x_label: String,
-    /// Quantity and unit of the vertical axis.
-    pub y_label: String,
-    /// Values of x to label; empty: every measured x where they are at most 12, else powers of ten.
-    pub x_ticks: Vec<f64>,
-}
-
-/// Text sizes in pixels.
-pub(super) const TITLE: f64 = 16.0;
-pub(super) const SMALL: f64 = 12.0;
-pub(super) const TICK: f64 = 11.5;
-/// From a label's line to the next.
-const LABEL_STEP: f64 = 15.0;
-/// From the plot's right edge to the keys of the labels beside it: room for leader lines.
-const LEADER: f64 = 20.0;
-pub(super) const KEY: f64 = 26.0;
-const WARNING: Colour = [166, 64, 0];
-
 /// One chart with every line labelled at its end; room is made where many lines end close together.
 ///
 /// Values that are not above 0 or not finite are left out and counted under the subtitle; without any value left the
@@ -109,18 +86,18 @@ fn drawn_large(frame: &Frame, plot: &Plot) -> Drawing {
     let header = Header::new(frame, &[left_out.note(), axes.floor_note(&plot)]);
     let widest = column_texts(&plot).map(|text| text_width(&text, SMALL, false)).fold(0.0, f64::max).min(210.0);
     let labels = column_texts(&plot).count() as f64 + 1.0;
-    let height = (header.height + 420.0_f64.max(labels * LABEL_STEP) + axes.foot()).round();
+    let height = (header.height + 420.0_f64.max(labels * LABEL_STEP) + FOOT).round();
     let mut drawing = Drawing::new(PAGE_WIDTH, height);
     let bounds = Bounds {
-        left: axes.left_margin(),
+        left: left_margin(&axes.y_ticks),
         top: header.height,
         right: PAGE_WIDTH - LEADER - KEY - 6.0 - widest - 8.0,
-        bottom: height - axes.foot(),
+        bottom: height - FOOT,
     };
     header.draw(&mut drawing);
     let panel = Panel::new(&axes, bounds);
     panel.draw_frame(&mut drawing, true, true);
-    axes.draw_names(&mut drawing, &bounds);
+    draw_axis_names(&mut drawing, &bounds, frame);
     let mut column = panel.draw_helpers(&mut drawing, &plot, true);
     column.extend(panel.draw_lines(&mut drawing, &plot));
     draw_column(&mut drawing, &bounds, &column, widest);
@@ -143,32 +120,22 @@ fn drawn_grid(frame: &Frame, plots: &[Plot], columns: usize) -> Drawing {
     let header = Header::new(frame, &notes);
     let legend = Legend::of(&plots);
     let (gap, title) = (18.0, 22.0);
-    let width = (PAGE_WIDTH - axes.left_margin() - 14.0 - gap * (columns - 1) as f64) / columns as f64;
+    let width = (PAGE_WIDTH - left_margin(&axes.y_ticks) - 14.0 - gap * (columns - 1) as f64) / columns as f64;
     let panel_height = (width * 0.95).clamp(210.0, 330.0);
     let last_row = plots.len().saturating_sub(columns);
-    let foot = axes.foot();
     let height =
-        header.height + rows as f64 * (title + panel_height) + (rows - 1) as f64 * 22.0 + foot + legend.height();
+        header.height + rows as f64 * (title + panel_height) + (rows - 1) as f64 * 22.0 + FOOT + legend.height();
     let mut drawing = Drawing::new(PAGE_WIDTH, height);
     header.draw(&mut drawing);
     let at = |i: usize| {
-        let left = axes.left_margin() + (i % columns) as f64 * (width + gap);
+        let left = left_margin(&axes.y_ticks) + (i % columns) as f64 * (width + gap);
         let top = header.height + (i / columns) as f64 * (title + panel_height + 22.0) + title;
         Bounds { left, top, right: left + width, bottom: top + panel_height }
     };
     for (i, plot) in plots.iter().enumerate() {
         let panel = Panel::new(&axes, at(i));
-        let name = shortened(&plot.title, 13.0, true, width);
-        let place = (at(i).left, at(i).top - 7.0);
-        drawing.add_text(Text {
-            at: place,
-            text: name,
-            size: 13.0,
-            bold: true,
-            colour: INK,
-            align: Align::Left,
-            turned: false,
-        });
+        let name = shortened(&plot.title, HEADING, true, width);
+        drawing.heading((at(i).left, at(i).top - 7.0), &name);
         panel.draw_frame(&mut drawing, i % columns == 0, i >= last_row);
         panel.draw_helpers(&mut drawing, plot, false);
         panel.draw_lines(&mut drawing, plot);
@@ -177,45 +144,9 @@ fn drawn_grid(frame: &Frame, plots: &[Plot], columns: usize) -> Drawing {
     if plots.is_empty() {
         Panel::new(&axes, all).draw_lines(&mut drawing, &Plot::default());
     }
-    axes.draw_names(&mut drawing, &all);
-    legend.draw(&mut drawing, axes.left_margin(), all.bottom + foot);
+    draw_axis_names(&mut drawing, &all, frame);
+    legend.draw(&mut drawing, left_margin(&axes.y_ticks), all.bottom + FOOT);
     drawing
-}
-
-/// How many points a logarithm cannot show.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct LeftOut {
-    pub not_finite: usize,
-    pub not_positive: usize,
-}
-
-impl LeftOut {
-    fn sum(parts: &[Self]) -> Self {
-        parts.iter().fold(Self::default(), |sum, part| Self {
-            not_finite: sum.not_finite + part.not_finite,
-            not_positive: sum.not_positive + part.not_positive,
-        })
-    }
-
-    /// Whether a point of these coordinates can be shown; counts it where not.
-    pub fn admits(&mut self, coordinates: &[f64]) -> bool {
-        let finite = coordinates.iter().all(|c| c.is_finite());
-        let positive = coordinates.iter().all(|&c| c > 0.0);
-        self.not_finite += usize::from(!finite);
-        self.not_positive += usize::from(finite && !positive);
-        finite && positive
-    }
-
-    pub fn note(&self) -> Option<String> {
-        let count = |n: usize, why: &str| {
-            (n > 0).then(|| format!("{n} point{} not shown: {why}", if n == 1 { "" } else { "s" }))
-        };
-        let notes: Vec<_> = [count(self.not_positive, "not above 0"), count(self.not_finite, "not finite")]
-            .into_iter()
-            .flatten()
-            .collect();
-        (!notes.is_empty()).then(|| notes.join(" · "))
-    }
 }
 
 /// The plot with only the points that can be shown, by ascending x, and only the series, guides and floor that are
@@ -230,6 +161,7 @@ fn showable(plot: &Plot) -> (Plot, LeftOut) {
             point.interval = point.interval.filter(|(low, high)| low.is_finite() && high.is_finite() && *high > 0.0);
         }
     }
+    left_out.empty.extend(plot.series.iter().filter(|series| series.points.is_empty()).map(|s| s.label.clone()));
     plot.series.retain(|series| !series.points.is_empty());
     plot.guides.retain(|guide| guide.slope.is_finite());
     plot.floor = plot.floor.filter(|floor| floor.value.is_finite() && floor.value > 0.0);
@@ -246,17 +178,15 @@ const FLOOR_REACH: f64 = 20.0;
 const INTERVAL_REACH: f64 = 3.0;
 
 /// Ranges, ticks and names common to the panels of a figure.
-struct Axes<'a> {
-    frame: &'a Frame,
+struct Axes {
     x: LogAxis,
     y: LogAxis,
     x_ticks: Vec<f64>,
     y_ticks: Vec<f64>,
-    x_names: Vec<String>,
 }
 
-impl<'a> Axes<'a> {
-    fn of(frame: &'a Frame, plots: &[Plot]) -> Self {
+impl Axes {
+    fn of(frame: &Frame, plots: &[Plot]) -> Self {
         let (low, high) = data(plots).fold((f64::INFINITY, 0.0_f64), |(l, h), p| (l.min(p.y), h.max(p.y)));
         let reach = |p: &Datum| p.interval.map(|(l, h)| [l.max(low / INTERVAL_REACH), h.min(high * INTERVAL_REACH)]);
         let floors = plots.iter().filter_map(|plot| plot.floor.as_ref()).map(|floor| floor.value);
@@ -273,19 +203,7 @@ impl<'a> Axes<'a> {
             (true, 1..=12) => measured,
             (true, _) => x.ticks(10),
         };
-        let x_names = x_ticks.iter().map(|&tick| number_label(tick)).collect();
-        Self { frame, x, y, x_ticks, y_ticks: y.ticks(9), x_names }
-    }
-
-    /// Room for tick labels and the vertical name.
-    fn left_margin(&self) -> f64 {
-        let widest = self.y_ticks.iter().map(|&t| text_width(&number_label(t), TICK, false)).fold(0.0, f64::max);
-        10.0 + SMALL + 8.0 + widest + 9.0
-    }
-
-    /// Room for tick labels and the horizontal name.
-    fn foot(&self) -> f64 {
-        46.0
+        Self { x, y, x_ticks, y_ticks: y.ticks(9) }
     }
 
     fn floor_note(&self, plot: &Plot) -> Option<String> {
@@ -293,64 +211,14 @@ impl<'a> Axes<'a> {
         let side = if floor.value < self.y.ends().0 { "below" } else { "above" };
         Some(format!("{} = {}, {side} the range shown", floor.label, number_label(floor.value)))
     }
-
-    fn draw_names(&self, drawing: &mut Drawing, b: &Bounds) {
-        let middle = ((b.left + b.right) / 2.0, b.bottom + 36.0);
-        drawing.text(middle, &self.frame.x_label, SMALL, INK, Align::Centre);
-        drawing.add_text(Text {
-            at: (10.0 + 0.76 * SMALL, (b.top + b.bottom) / 2.0),
-            text: shortened(&self.frame.y_label, SMALL, false, b.bottom - b.top),
-            size: SMALL,
-            bold: false,
-            colour: INK,
-            align: Align::Centre,
-            turned: true,
-        });
-    }
-}
-
-/// Title, subtitle and notes, wrapped to the page.
-pub(super) struct Header {
-    lines: Vec<(String, f64, bool, Colour)>,
-    pub height: f64,
-}
-
-impl Header {
-    pub fn new(frame: &Frame, notes: &[Option<String>]) -> Self {
-        let wrap = |text: &str, size: f64, bold: bool, colour: Colour| {
-            wrapped(text, size, bold, PAGE_WIDTH - 24.0).into_iter().map(move |line| (line, size, bold, colour))
-        };
-        let mut lines: Vec<_> = wrap(&frame.title, TITLE, true, INK).collect();
-        lines.extend(wrap(&frame.subtitle, SMALL, false, GREY));
-        lines.extend(notes.iter().flatten().flat_map(|note| wrap(note, SMALL, false, WARNING)));
-        let height = 10.0 + lines.iter().map(|line| 1.4 * line.1).sum::<f64>() + 10.0;
-        Self { lines, height }
-    }
-
-    pub fn draw(&self, drawing: &mut Drawing) {
-        let mut y = 10.0;
-        for (text, size, bold, colour) in &self.lines {
-            let at = (12.0, y + size);
-            let (text, size, bold, colour) = (text.clone(), *size, *bold, *colour);
-            drawing.add_text(Text { at, text, size, bold, colour, align: Align::Left, turned: false });
-            y += 1.4 * size;
-        }
-    }
 }
 
 /// The axes at the pixels of one panel.
 struct Panel<'a> {
-    axes: &'a Axes<'a>,
+    axes: &'a Axes,
     x: LogAxis,
     y: LogAxis,
     b: Bounds,
-}
-
-/// A label beside the plot: where its line ends, what it says, and the key before it (none: a helper line, in grey).
-struct Ending {
-    at: Place,
-    text: String,
-    style: Option<Style>,
 }
 
 impl<'a> Panel<'a> {
@@ -359,37 +227,16 @@ impl<'a> Panel<'a> {
     }
 
     /// Grid, ticks and, where asked, their labels.
-    fn draw_frame(&self, drawing: &mut Drawing, y_names: bool, x_names: bool) {
-        let b = self.b;
-        for &tick in &self.axes.y_ticks {
-            let y = self.y.pixel(tick);
-            drawing.line(&[(b.left, y), (b.right, y)], 1.0, GRID, Dash::Solid);
-            if y_names {
-                drawing.text((b.left - 7.0, y + 4.0), &number_label(tick), TICK, GREY, Align::Right);
-            }
-        }
-        for y in self.y.small_ticks().into_iter().map(|tick| self.y.pixel(tick)) {
-            drawing.line(&[(b.left, y), (b.left + 3.0, y)], 1.0, PALE, Dash::Solid);
-        }
-        let places: Vec<f64> = self.axes.x_ticks.iter().map(|&tick| self.x.pixel(tick)).collect();
-        let widths = self.axes.x_names.iter().map(|name| text_width(name, TICK, false));
-        let shown = kept_apart(&places.iter().copied().zip(widths).collect::<Vec<_>>(), 5.0);
-        for ((&x, name), shown) in places.iter().zip(&self.axes.x_names).zip(shown) {
-            drawing.line(&[(x, b.top), (x, b.bottom)], 1.0, GRID, Dash::Solid);
-            drawing.line(&[(x, b.bottom), (x, b.bottom + 4.0)], 1.0, PALE, Dash::Solid);
-            if shown && x_names {
-                drawing.text((x, b.bottom + 17.0), name, TICK, GREY, Align::Centre);
-            }
-        }
-        let corner = [(b.left, b.top), (b.left, b.bottom), (b.right, b.bottom)];
-        drawing.line(&corner, 1.0, PALE, Dash::Solid);
+    fn draw_frame(&self, drawing: &mut Drawing, y_named: bool, x_named: bool) {
+        draw_y_grid(drawing, &self.b, &self.y, &self.axes.y_ticks, y_named);
+        draw_x_grid(drawing, &self.b, &self.x, &self.axes.x_ticks, x_named);
+        draw_corner(drawing, &self.b);
     }
 
     /// Guides and floor. With `beside`, labels of those that reach the right edge are returned for the column beside
     /// the plot; all others are written along the lines.
     fn draw_helpers(&self, drawing: &mut Drawing, plot: &Plot, beside: bool) -> Vec<Ending> {
         let mut column = Vec::new();
-        let mut taken = self.obstacles(plot);
         let floor = plot.floor.iter().filter(|floor| self.y.holds(floor.value)).map(|floor| {
             let y = self.y.pixel(floor.value);
             (vec![(self.b.left, y), (self.b.right, y)], Dash::Dotted, floor.label.as_str())
@@ -398,7 +245,11 @@ impl<'a> Panel<'a> {
             .guides
             .iter()
             .filter_map(|guide| Some((self.guide(plot, guide.slope)?, Dash::Solid, guide.label.as_str())));
-        for (line, dash, label) in floor.chain(guides) {
+        let helpers: Vec<_> = floor.chain(guides).collect();
+        let mut taken: Vec<Bounds> =
+            plot.series.iter().flat_map(|series| boxes_along(&self.places(series), 3.0)).collect();
+        taken.extend(helpers.iter().flat_map(|(line, ..)| boxes_along(line, 1.0)));
+        for (line, dash, label) in helpers {
             drawing.line(&line, 1.1, PALE, dash);
             let end = line[1];
             if beside && end.0 > self.b.right - 0.5 {
@@ -429,21 +280,8 @@ impl<'a> Panel<'a> {
         visible.then(|| vec![from, (from.0 + part * (to.0 - from.0), edge)])
     }
 
-    /// Small boxes all along the series' lines, which labels inside the panel keep clear of.
-    fn obstacles(&self, plot: &Plot) -> Vec<Bounds> {
-        let mut boxes = Vec::new();
-        for series in &plot.series {
-            let places: Vec<Place> = series.points.iter().map(|p| (self.x.pixel(p.x), self.y.pixel(p.y))).collect();
-            for ends in places.windows(2) {
-                let (dx, dy) = (ends[1].0 - ends[0].0, ends[1].1 - ends[0].1);
-                let steps = (dx.abs().max(dy.abs()) / 4.0).ceil().max(1.0) as u32;
-                let at = (0..=steps)
-                    .map(|i| f64::from(i) / f64::from(steps))
-                    .map(|t| (ends[0].0 + t * dx, ends[0].1 + t * dy));
-                boxes.extend(at.map(|(x, y)| Bounds { left: x - 3.0, top: y - 3.0, right: x + 3.0, bottom: y + 3.0 }));
-            }
-        }
-        boxes
+    fn places(&self, series: &Series) -> Vec<Place> {
+        series.points.iter().map(|p| (self.x.pixel(p.x), self.y.pixel(p.y))).collect()
     }
 
     /// Writes `label` beside the line, as near to its end as there is room; nowhere if there is none (a grid's
@@ -478,23 +316,20 @@ impl<'a> Panel<'a> {
     /// Bands below, then lines, then markers; returns where each line ends.
     fn draw_lines(&self, drawing: &mut Drawing, plot: &Plot) -> Vec<Ending> {
         if plot.series.is_empty() {
-            let middle = ((self.b.left + self.b.right) / 2.0, (self.b.top + self.b.bottom) / 2.0);
-            drawing.text(middle, "no data", TITLE, GREY, Align::Centre);
+            draw_no_data(drawing, &self.b);
         }
         for series in &plot.series {
             self.draw_band(drawing, series);
         }
-        let place = |p: &Datum| (self.x.pixel(p.x), self.y.pixel(p.y));
         for series in &plot.series {
-            let line: Vec<Place> = series.points.iter().map(place).collect();
-            drawing.line(&line, 1.8, series.style.colour, series.style.dash);
+            drawing.line(&self.places(series), 1.8, series.style.colour, series.style.dash);
         }
         let radius = if self.b.right - self.b.left > 350.0 { 3.6 } else { 2.8 };
         for series in &plot.series {
-            series.points.iter().for_each(|p| draw_marker(drawing, place(p), radius, &series.style));
+            self.places(series).into_iter().for_each(|at| draw_marker(drawing, at, radius, &series.style));
         }
         let ending = |s: &Series| {
-            let at = place(s.points.last()?);
+            let at = *self.places(s).last()?;
             Some(Ending { at, text: s.label.clone(), style: Some(s.style) })
         };
         plot.series.iter().filter_map(ending).collect()
@@ -525,6 +360,19 @@ impl<'a> Panel<'a> {
     }
 }
 
+/// Small boxes all along a line, `half` pixels to each side of it: labels keep clear of them.
+fn boxes_along(line: &[Place], half: f64) -> Vec<Bounds> {
+    let pieces = line.windows(2).flat_map(|ends| {
+        let (dx, dy) = (ends[1].0 - ends[0].0, ends[1].1 - ends[0].1);
+        let steps = (dx.abs().max(dy.abs()) / 4.0).ceil().max(1.0) as u32;
+        let at = move |i| {
+            (ends[0].0 + dx * f64::from(i) / f64::from(steps), ends[0].1 + dy * f64::from(i) / f64::from(steps))
+        };
+        (0..=steps).map(at)
+    });
+    pieces.map(|(x, y)| Bounds { left: x - half, top: y - half, right: x + half, bottom: y + half }).collect()
+}
+
 /// Everything that may be labelled in the column beside a chart.
 fn column_texts(plot: &Plot) -> impl Iterator<Item = String> {
     let series = plot.series.iter().map(|series| series.label.clone());
@@ -532,97 +380,144 @@ fn column_texts(plot: &Plot) -> impl Iterator<Item = String> {
     series.chain(guides).chain(plot.floor.iter().map(|floor| floor.label.clone()))
 }
 
-/// Labels beside the plot, as near to their lines' ends as they can stand apart, each tied to its end.
-fn draw_column(drawing: &mut Drawing, b: &Bounds, endings: &[Ending], width: f64) {
-    let wanted: Vec<f64> = endings.iter().map(|ending| ending.at.1).collect();
-    let places = spread(&wanted, LABEL_STEP, b.top + 4.0, b.bottom - 4.0);
-    let left = b.right + LEADER;
-    for (ending, y) in endings.iter().zip(places) {
-        let from = (ending.at.0 + if ending.style.is_some() { 6.0 } else { 0.0 }, ending.at.1);
-        let colour = ending.style.map_or(GRID, |style| lightened(style.colour, 0.55));
-        drawing.line(
-            &[from, (b.right.max(from.0) + 2.0, from.1), (left - 4.0, y), (left, y)],
-            0.8,
-            colour,
-            Dash::Solid,
-        );
-        let text = shortened(&ending.text, SMALL, false, width);
-        match &ending.style {
-            Some(style) => {
-                draw_key(drawing, left, y, KEY, style);
-                drawing.text((left + KEY + 6.0, y + 4.0), &text, SMALL, INK, Align::Left);
-            }
-            None => drawing.text((left + 2.0, y + 4.0), &text, SMALL, GREY, Align::Left),
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use proptest::test_runner::{Config, TestRng, TestRunner};
+
+    const NAMES: [&str; 8] = [
+        "uniform:best",
+        "stratified:sheet",
+        "halton:joint:digits@each",
+        "hammersley:plain",
+        "ld:sheet",
+        "sobol",
+        "a name far longer than any sampler that SPEC §4 can spell, cut with an ellipsis",
+        "blue noise",
+    ];
+
+    fn datum(x: f64, y: f64) -> Datum {
+        Datum { x, y, interval: Some((0.9 * y, 1.1 * y)) }
+    }
+
+    fn frame() -> Frame {
+        let [title, subtitle, x_label, y_label] =
+            ["Error", "made up", "samples per pixel", "RMSE (radiance)"].map(str::to_owned);
+        Frame { title, subtitle, x_label, y_label, x_ticks: Vec::new() }
+    }
+
+    fn plot(series: Vec<Series>) -> Plot {
+        let guide = |slope, label: &str| Guide { slope, label: label.to_owned() };
+        Plot {
+            title: "scene".to_owned(),
+            series,
+            guides: vec![guide(-0.5, "slope −1/2"), guide(-1.0, "slope −1"), guide(-1.5, "slope −3/2")],
+            floor: Some(Floor { value: 1e-3, label: "reference noise".to_owned() }),
         }
     }
-}
 
-/// One key for all panels: the series, and below them what the grey lines are.
-struct Legend {
-    entries: Vec<(String, Style)>,
-    floors: Vec<String>,
-    guides: Vec<Guide>,
-    columns: usize,
-    step: f64,
-}
-
-const LEGEND_STEP: f64 = 18.0;
-
-impl Legend {
-    /// Labels in the order they first appear.
-    fn of(plots: &[Plot]) -> Self {
-        let mut entries: Vec<(String, Style)> = Vec::new();
-        for series in plots.iter().flat_map(|plot| &plot.series) {
-            if !entries.iter().any(|(label, _)| *label == series.label) {
-                entries.push((series.label.clone(), series.style));
-            }
-        }
-        let mut floors: Vec<String> =
-            plots.iter().filter_map(|plot| plot.floor.as_ref()).map(|f| f.label.clone()).collect();
-        floors.dedup();
-        let mut guides: Vec<Guide> = plots.iter().flat_map(|plot| plot.guides.iter().cloned()).collect();
-        guides.sort_by(|a, b| b.slope.total_cmp(&a.slope));
-        guides.dedup();
-        let widest = entries.iter().map(|(text, _)| text_width(text, SMALL, false)).fold(40.0, f64::max);
-        let step = (KEY + 6.0 + widest + 16.0).min(PAGE_WIDTH - 80.0);
-        let fitting = (((PAGE_WIDTH - 60.0) / step) as usize).max(1);
-        // As few rows as fit, and those equally long.
-        let rows = entries.len().div_ceil(fitting).max(1);
-        Self { columns: entries.len().div_ceil(rows).max(1), entries, floors, guides, step }
+    fn line(name: &str, start: f64, slope: f64) -> Series {
+        let at = |x: f64| datum(x, start * libm::pow(x, slope));
+        Series::of_sampler(name, [1.0, 4.0, 16.0, 26.0, 64.0, 256.0].map(at).to_vec())
     }
 
-    fn rows(&self) -> usize {
-        self.entries.len().div_ceil(self.columns)
+    /// Exponents of ten from 1e-12 to 1e3, and now and then what no logarithm shows.
+    fn value() -> impl Strategy<Value = f64> {
+        let odd = prop::sample::select(vec![0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-300, 1e300]);
+        prop_oneof![20 => (-12.0..3.0f64).prop_map(|e| libm::pow(10.0, e)), 1 => odd]
     }
 
-    fn height(&self) -> f64 {
-        let helpers = usize::from(!self.floors.is_empty() || !self.guides.is_empty());
-        10.0 + LEGEND_STEP * (self.rows() + helpers) as f64
+    fn any_plot() -> impl Strategy<Value = Plot> {
+        let point = (0u32..12, value(), prop::option::of((value(), value())));
+        let point = point.prop_map(|(k, y, interval)| Datum { x: libm::exp2(k.into()), y, interval });
+        let series = (prop::sample::select(&NAMES[..]), prop::collection::vec(point, 0..9));
+        let series = series.prop_map(|(name, points)| Series::of_sampler(name, points));
+        (prop::collection::vec(series, 0..14), value()).prop_map(|(series, floor)| Plot {
+            floor: Some(Floor { value: floor, label: "reference noise".to_owned() }),
+            ..plot(series)
+        })
     }
 
-    fn draw(&self, drawing: &mut Drawing, left: f64, top: f64) {
-        // Presets of one family that follow each other stand below each other.
-        let by_column = self.entries.len() > 1 && self.entries[0].1.colour == self.entries[1].1.colour;
-        for (i, (text, style)) in self.entries.iter().enumerate() {
-            let (column, row) =
-                if by_column { (i / self.rows(), i % self.rows()) } else { (i % self.columns, i / self.columns) };
-            let (x, y) = (left + column as f64 * self.step, top + 8.0 + row as f64 * LEGEND_STEP);
-            draw_key(drawing, x, y, KEY, style);
-            let text = shortened(text, SMALL, false, self.step - KEY - 10.0);
-            drawing.text((x + KEY + 6.0, y + 4.0), &text, SMALL, INK, Align::Left);
-        }
-        self.draw_helpers(drawing, left, top + 8.0 + self.rows() as f64 * LEGEND_STEP);
+    fn runner(cases: u32) -> TestRunner {
+        let config = Config { cases, failure_persistence: None, ..Config::default() };
+        TestRunner::new_with_rng(config, TestRng::deterministic_rng(Default::default()))
     }
 
-    fn draw_helpers(&self, drawing: &mut Drawing, left: f64, y: f64) {
-        let guides = self.guides.iter().map(|guide| guide.label.as_str()).collect::<Vec<_>>().join(", ");
-        let order = if self.guides.len() > 1 { " (from the top)" } else { "" };
-        let entries = [(self.floors.join(", "), Dash::Dotted), (format!("{guides}{order}"), Dash::Solid)];
-        let mut x = left;
-        for (text, dash) in entries.iter().filter(|entry| !entry.0.is_empty()) {
-            drawing.line(&[(x, y), (x + KEY, y)], 1.1, PALE, *dash);
-            drawing.text((x + KEY + 6.0, y + 4.0), text, SMALL, INK, Align::Left);
-            x += KEY + 6.0 + text_width(text, SMALL, false) + 24.0;
+    #[test]
+    fn whatever_the_data_no_text_overlaps_another_and_nothing_leaves_the_page() {
+        let panels = (prop::collection::vec(any_plot(), 0..5), 1usize..4);
+        runner(60)
+            .run(&panels, |(plots, columns)| {
+                plots.iter().for_each(|plot| drawn_large(&frame(), plot).assert_legible());
+                drawn_grid(&frame(), &plots, columns).assert_legible();
+                Ok(())
+            })
+            .unwrap();
+    }
+
+    #[test]
+    fn fourteen_lines_that_end_together_are_all_labelled_apart() {
+        let lines = (0..14).map(|i| line(&format!("variant {i}"), 1.0 + 1e-6 * f64::from(i), -0.5)).collect();
+        let drawing = drawn_large(&frame(), &plot(lines));
+        drawing.assert_legible();
+        let svg = drawing.finish("").svg;
+        assert!((0..14).all(|i| svg.contains(&format!("variant {i}\n"))));
+    }
+
+    #[test]
+    fn the_same_input_gives_the_same_bytes() {
+        let plot = plot(vec![line("ld:best", 1.0, -0.75), line("uniform:sheet", 0.9, -0.5)]);
+        assert_eq!(loglog_chart(&frame(), &plot), loglog_chart(&frame(), &plot));
+        let plots = [plot.clone(), plot];
+        assert_eq!(small_multiples(&frame(), &plots, 2), small_multiples(&frame(), &plots, 2));
+    }
+
+    #[test]
+    fn points_that_no_logarithm_shows_are_counted_by_cause_and_their_series_named() {
+        let bad = [0.0, -1.0, f64::NAN, f64::INFINITY, 0.0].map(|y| Datum { x: 1.0, y, interval: None });
+        let series = vec![line("uniform", 1.0, -0.5), Series::of_sampler("ld:best", bad.to_vec())];
+        let svg = loglog_chart(&frame(), &plot(series)).svg;
+        let note = "3 points not shown: not above 0 · 2 points not shown: not finite · no data: ld:best";
+        assert!(svg.contains(note), "{svg}");
+        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+    }
+
+    #[test]
+    fn without_data_a_chart_says_so() {
+        assert!(loglog_chart(&frame(), &Plot::default()).svg.contains("no data"));
+        assert!(small_multiples(&frame(), &[], 3).svg.contains("no data"));
+        let panels = [Plot::default(), plot(vec![line("ld", 1.0, -1.0)])];
+        assert!(small_multiples(&frame(), &panels, 2).svg.contains("no data"));
+    }
+
+    #[test]
+    fn a_floor_far_below_the_data_is_told_in_words() {
+        let mut plot = plot(vec![line("ld:best", 1.0, -0.25)]);
+        plot.floor = Some(Floor { value: 0.25 / 19.0, label: "reference noise".to_owned() });
+        assert!(!loglog_chart(&frame(), &plot).svg.contains("the range shown"), "near enough to be drawn");
+        plot.floor = Some(Floor { value: 1e-9, label: "reference noise".to_owned() });
+        let svg = loglog_chart(&frame(), &plot).svg;
+        assert!(svg.contains("reference noise = 1e-9, below the range shown"), "{svg}");
+    }
+
+    #[test]
+    fn a_guide_runs_through_the_middle_of_the_first_values_with_its_slope() {
+        let plot = Plot { floor: None, ..plot(vec![line("ld", 4.0, -0.5), line("uniform", 1.0, -0.5)]) };
+        let axes = Axes::of(&frame(), std::slice::from_ref(&plot));
+        let panel = Panel::new(&axes, Bounds { left: 0.0, top: 0.0, right: 300.0, bottom: 200.0 });
+        let guide = panel.guide(&plot, -0.5).unwrap();
+        assert!((guide[0].1 - panel.y.pixel(2.0)).abs() < 1e-9, "the geometric mean of 4 and 1 is 2");
+        let (_, end) = panel.x.ends();
+        assert!((guide[1].1 - panel.y.pixel(2.0 / end.sqrt())).abs() < 1e-9, "{guide:?}");
+        assert!((guide[1].0 - 300.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn measured_counts_label_the_horizontal_axis() {
+        let svg = loglog_chart(&frame(), &plot(vec![line("ld", 1.0, -1.0)])).svg;
+        for count in ["1", "4", "16", "26", "64", "256"] {
+            assert!(svg.contains(&format!(">\n{count}\n</text>")), "{count}");
         }
     }
 }
