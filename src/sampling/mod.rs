@@ -1,1 +1,16 @@
 //! Sample points: sets, orders, randomisations, and who reads which numbers.
+//!
+//! A number is R_key(P(π(i), D)): point set P, index order π, dimensions D of the decision, randomisation R under a key.
+
+pub mod hash;
+mod layout;
+pub mod radical;
+mod sampler;
+pub mod sobol;
+mod spec;
+pub mod strata;
+pub mod warp;
+
+pub use layout::{Claim, Decision, Dim1, Dim2, SampleLayout};
+pub use sampler::{ALGORITHM, PixelKey, PointSource, Sampler, SamplerSet, point_set};
+pub use spec::{MAX_SAMPLES, Order, Points, Preset, Random, SamplerSpec, Scope, every_legal_spec};

@@ -1,0 +1,327 @@
+//! Queries for packets of rays: one traversal of the tree for all lanes.
+
+use glam::Vec3;
+
+use super::build::{Accel, Slot};
+use super::{Bounds, Hit, Ray, meet, reciprocal_of, slab};
+
+/// Rays in a packet.
+pub const LANES: usize = 16;
+
+/// Up to [`LANES`] rays in structure-of-arrays form, each with the largest distance that still counts.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+pub struct Packet {
+    origin: [[f32; LANES]; 3],
+    direction: [[f32; LANES]; 3],
+    reciprocal: [[f32; LANES]; 3],
+    /// Nearest distance so far, or the limit; −∞ where a lane is idle or done.
+    limit: [f32; LANES],
+    triangle: [u32; LANES],
+}
+
+/// No triangle.
+const NOTHING: u32 = u32::MAX;
+
+impl Default for Packet {
+    fn default() -> Self {
+        Self {
+            origin: [[0.0; LANES]; 3],
+            direction: [[1.0; LANES]; 3],
+            reciprocal: [[1.0; LANES]; 3],
+            limit: [f32::NEG_INFINITY; LANES],
+            triangle: [NOTHING; LANES],
+        }
+    }
+}
+
+impl Packet {
+    /// Makes every lane idle.
+    #[inline]
+    pub fn clear(&mut self) {
+        self.limit = [f32::NEG_INFINITY; LANES];
+        self.triangle = [NOTHING; LANES];
+    }
+
+    /// Puts a ray into a lane; hits count at 0 < t < `limit`.
+    #[inline]
+    pub fn set(&mut self, lane: usize, ray: &Ray, limit: f32) {
+        let reciprocal = reciprocal_of(ray.direction);
+        for axis in 0..3 {
+            self.origin[axis][lane] = ray.origin[axis];
+            self.direction[axis][lane] = ray.direction[axis];
+            self.reciprocal[axis][lane] = reciprocal[axis];
+        }
+        self.limit[lane] = limit;
+        self.triangle[lane] = NOTHING;
+    }
+
+    /// What the lane's ray met, after [`Accel::closest`].
+    #[inline]
+    pub fn hit(&self, lane: usize) -> Option<Hit> {
+        (self.triangle[lane] != NOTHING).then(|| Hit { t: self.limit[lane], triangle: self.triangle[lane] })
+    }
+
+    /// Whether the lane's ray met anything, after [`Accel::occluded`].
+    #[inline]
+    pub fn is_occluded(&self, lane: usize) -> bool {
+        self.triangle[lane] != NOTHING
+    }
+
+    #[inline(always)]
+    fn lane(&self, l: usize) -> (Vec3, Vec3, Vec3) {
+        let at = |a: &[[f32; LANES]; 3]| Vec3::new(a[0][l], a[1][l], a[2][l]);
+        (at(&self.origin), at(&self.direction), at(&self.reciprocal))
+    }
+
+    /// Which lanes meet a box no farther than their limit, as bits, and how near the first of them enters it.
+    #[inline(always)]
+    fn meets(&self, bounds: &Bounds) -> (u32, f32) {
+        let mut near = [0.0f32; LANES];
+        let mut met = [0u32; LANES];
+        for l in 0..LANES {
+            let (origin, _, reciprocal) = self.lane(l);
+            let (enter, leave) = slab(bounds.min, bounds.max, origin, reciprocal);
+            near[l] = enter;
+            met[l] = u32::from((enter <= leave) & (leave >= 0.0) & (enter <= self.limit[l]));
+        }
+        let mut mask = 0;
+        for (l, &m) in met.iter().enumerate() {
+            mask |= m << l;
+        }
+        (mask, near[mask.trailing_zeros() as usize % LANES])
+    }
+
+    /// Tests a triangle against all lanes and keeps the nearest hit, of equally near ones the lowest triangle.
+    #[inline(always)]
+    fn closest_of(&mut self, slot: &Slot) {
+        for l in 0..LANES {
+            let (origin, direction, reciprocal) = self.lane(l);
+            let t = meet(&slot.corners, &slot.bounds, origin, direction, reciprocal);
+            let nearer = (t > 0.0) & ((t < self.limit[l]) | ((t == self.limit[l]) & (slot.id < self.triangle[l])));
+            // A limit is not a hit: the first hit must lie strictly before it, and then has a triangle.
+            let nearer = nearer & !((t == self.limit[l]) & (self.triangle[l] == NOTHING));
+            self.limit[l] = if nearer { t } else { self.limit[l] };
+            self.triangle[l] = if nearer { slot.id } else { self.triangle[l] };
+        }
+    }
+
+    /// Tests a triangle against all lanes and retires the lanes that it stops.
+    #[inline(always)]
+    fn any_of(&mut self, slot: &Slot) {
+        for l in 0..LANES {
+            let (origin, direction, reciprocal) = self.lane(l);
+            let t = meet(&slot.corners, &slot.bounds, origin, direction, reciprocal);
+            let stopped = (t > 0.0) & (t < self.limit[l]);
+            self.limit[l] = if stopped { f32::NEG_INFINITY } else { self.limit[l] };
+            self.triangle[l] = if stopped { slot.id } else { self.triangle[l] };
+        }
+    }
+}
+
+/// Nodes waiting on the way down: one for each level of the tree, on the stack for all but degenerate trees.
+const STACK: usize = 96;
+
+impl Accel {
+    /// Finds, for every ray of the packet, the nearest hit below its limit.
+    pub fn closest(&self, packet: &mut Packet) {
+        self.traverse(packet, Packet::closest_of, |_| false);
+    }
+
+    /// Finds, for every ray of the packet, whether anything lies below its limit.
+    pub fn occluded(&self, packet: &mut Packet) {
+        self.traverse(packet, Packet::any_of, |p| p.limit.iter().all(|&t| t == f32::NEG_INFINITY));
+    }
+
+    #[inline(always)]
+    fn traverse(&self, packet: &mut Packet, test: impl Fn(&mut Packet, &Slot), done: impl Fn(&Packet) -> bool) {
+        if self.nodes.is_empty() {
+            return;
+        }
+        let mut waiting = [0u32; STACK];
+        let mut heap = Vec::new();
+        let waiting: &mut [u32] = if self.depth <= STACK {
+            &mut waiting
+        } else {
+            heap.resize(self.depth, 0);
+            &mut heap
+        };
+        let mut count = 0;
+        let mut index = 0usize;
+        loop {
+            let node = &self.nodes[index];
+            let (mut inner, mut inners) = ([(0usize, 0.0f32); 2], 0);
+            for side in 0..2 {
+                let (mask, near) = packet.meets(&node.bounds[side]);
+                if mask == 0 {
+                    continue;
+                }
+                match node.children[side].split() {
+                    Ok(slots) => {
+                        for slot in &self.slots[slots] {
+                            test(packet, slot);
+                        }
+                        if done(packet) {
+                            return;
+                        }
+                    }
+                    Err(child) => {
+                        inner[inners] = (child, near);
+                        inners += 1;
+                    }
+                }
+            }
+            index = match inners {
+                0 if count == 0 => return,
+                0 => {
+                    count -= 1;
+                    waiting[count] as usize
+                }
+                1 => inner[0].0,
+                _ => {
+                    // The nearer one first; the order cannot change the answer.
+                    let nearer = usize::from(inner[1].1 < inner[0].1);
+                    waiting[count] = inner[1 - nearer].0 as u32;
+                    count += 1;
+                    inner[nearer].0
+                }
+            };
+        }
+    }
+
+    /// The nearest hit of one ray below `limit`: a packet of one.
+    pub fn closest_one(&self, ray: &Ray, limit: f32) -> Option<Hit> {
+        let mut packet = Packet::default();
+        packet.set(0, ray, limit);
+        self.closest(&mut packet);
+        packet.hit(0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Triangle, box_padding};
+    use super::*;
+    use crate::sampling::hash::{bits64, unit_f32};
+
+    /// Numbers in [−1, 1) from a stream.
+    struct Stream(u64, u64);
+
+    impl Stream {
+        fn signed(&mut self) -> f32 {
+            self.1 += 1;
+            2.0 * unit_f32((bits64(self.0, self.1) >> 32) as u32) - 1.0
+        }
+        fn vec3(&mut self) -> Vec3 {
+            Vec3::new(self.signed(), self.signed(), self.signed())
+        }
+    }
+
+    /// The one formula over all triangles, in order.
+    fn brute_force(triangles: &[Triangle], reach: f32, ray: &Ray, limit: f32) -> Option<Hit> {
+        let mut best: Option<Hit> = None;
+        for (i, triangle) in triangles.iter().enumerate() {
+            let bounds = triangle.bounds(box_padding(reach));
+            let t = meet(&triangle.corners, &bounds, ray.origin, ray.direction, reciprocal_of(ray.direction));
+            if t > 0.0 && t < best.map_or(limit, |b| b.t) {
+                best = Some(Hit { t, triangle: i as u32 });
+            }
+        }
+        best
+    }
+
+    fn agree(triangles: &[Triangle], reach: f32, rays: &[(Ray, f32)]) {
+        let accel = Accel::new(triangles, reach);
+        for chunk in rays.chunks(LANES) {
+            let mut packet = Packet::default();
+            for (lane, (ray, limit)) in chunk.iter().enumerate() {
+                packet.set(lane, ray, *limit);
+            }
+            let mut shadow = packet.clone();
+            accel.closest(&mut packet);
+            accel.occluded(&mut shadow);
+            for (lane, (ray, limit)) in chunk.iter().enumerate() {
+                let truth = brute_force(triangles, reach, ray, *limit);
+                assert_eq!(packet.hit(lane), truth, "{ray:?} up to {limit}");
+                assert_eq!(accel.closest_one(ray, *limit), truth, "alone: {ray:?}");
+                assert_eq!(shadow.is_occluded(lane), truth.is_some());
+            }
+        }
+    }
+
+    fn rays(stream: &mut Stream, count: usize, scale: f32) -> Vec<(Ray, f32)> {
+        (0..count)
+            .map(|i| {
+                let mut direction = stream.vec3();
+                // Every fourth ray runs along an axis or in a coordinate plane.
+                if i % 4 == 0 {
+                    direction.x = 0.0;
+                }
+                if i % 8 == 0 {
+                    direction.y = -0.0;
+                }
+                let limit = if i % 3 == 0 { 0.7 * scale } else { f32::INFINITY };
+                (Ray { origin: stream.vec3() * (1.5 * scale), direction }, limit)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn every_hit_equals_brute_force_on_random_degenerate_huge_tiny_and_flat_triangles() {
+        for (kind, scale) in
+            [("random", 1.0f32), ("tiny", 1e-6), ("huge", 1e6), ("slivers", 1.0), ("flat", 1.0), ("twice", 1.0)]
+        {
+            let mut stream = Stream(7, 0);
+            let mut triangles: Vec<Triangle> = (0..300)
+                .map(|i| {
+                    let centre = stream.vec3();
+                    let mut corners = [0; 3].map(|_| (centre + 0.3 * stream.vec3()) * scale);
+                    match kind {
+                        "slivers" => corners[2] = corners[0] + (corners[1] - corners[0]) * 0.5 + stream.vec3() * 1e-6,
+                        "flat" => corners.iter_mut().for_each(|c| c[i % 3] = (i % 5) as f32 * 0.25),
+                        _ => {}
+                    }
+                    if i % 37 == 0 {
+                        corners[1] = corners[0];
+                    }
+                    Triangle { corners }
+                })
+                .collect();
+            if kind == "twice" {
+                // Every triangle once more: ties all over, which go to the lower index.
+                triangles.extend_from_within(..);
+            }
+            agree(&triangles, 4.0 * scale, &rays(&mut stream, 800, scale));
+        }
+        agree(&[], 1.0, &rays(&mut Stream(3, 0), 4, 1.0));
+        let one = Triangle { corners: [Vec3::X, Vec3::Y, Vec3::Z] };
+        agree(&[one], 3.0, &rays(&mut Stream(4, 0), 64, 1.0));
+    }
+
+    /// A closed box of two triangles a side, rays from inside through faces, edges and the diagonals: none escapes.
+    #[test]
+    fn no_ray_slips_between_triangles_that_share_an_edge() {
+        let corner = |i: usize| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2 & 1) as f32) * 2.0 - 1.0;
+        let quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
+        let triangles: Vec<Triangle> = quads
+            .iter()
+            .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
+            .map(|t| Triangle { corners: t.map(corner) })
+            .collect();
+        let accel = Accel::new(&triangles, 4.0);
+        let mut stream = Stream(11, 0);
+        for i in 0..20_000 {
+            let origin = stream.vec3() * 0.9;
+            // Aim at points of edges and diagonals, exactly representable ones among them.
+            let s = if i % 2 == 0 { stream.signed() } else { (i % 17) as f32 / 8.0 - 1.0 };
+            let target = match i % 3 {
+                0 => Vec3::new(1.0, s, s),
+                1 => Vec3::new(1.0, 1.0, s),
+                _ => Vec3::new(s, -1.0, stream.signed()),
+            };
+            let ray = Ray { origin, direction: target - origin };
+            let hit = accel.closest_one(&ray, f32::INFINITY).unwrap_or_else(|| panic!("{ray:?} escapes"));
+            assert!((hit.t - 1.0).abs() < 1e-5, "{ray:?}: {hit:?}");
+        }
+    }
+}

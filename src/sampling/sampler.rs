@@ -1,0 +1,444 @@
+//! Samplers at work: a number is a pure function of (seed, pixel, sample index, dimension).
+
+use super::hash::{bits32, derive, mix64, permute, unit_f32};
+use super::layout::{Claim, Decision, Dim1, Dim2, SampleLayout};
+use super::radical::{PRIMES, digit_count, digit_scrambled, radical_inverse, radical_inverse_f64};
+use super::sobol::{SobolAxis, owen_scramble};
+use super::spec::{MAX_SAMPLES, Order, Points, Random, SamplerSpec, Scope};
+use super::strata::{factor_pair, in_stratum, in_stratum_f64};
+use crate::error::{Error, Result};
+
+/// Raised whenever the numbers of any sampler change.
+pub const ALGORITHM: u32 = 1;
+
+/// Whose numbers: one pixel of the image. Its key is (x, y), so crops and image sizes do not change it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PixelKey(u64);
+
+impl PixelKey {
+    /// The pixel in column `x` from the left and row `y` from the top.
+    pub const fn new(x: u32, y: u32) -> Self {
+        Self((y as u64) << 32 | x as u64)
+    }
+}
+
+/// Numbers for the decisions of a scene.
+///
+/// The `fill` functions write a span of consecutive sample indices of one pixel and are the way of the render loop;
+/// single look-ups are spans of length 1.
+pub trait PointSource: Sync {
+    /// Samples per pixel; indices are `0..samples()`.
+    fn samples(&self) -> u32;
+    /// Coordinates of samples `first .. first + out.len()`, each in [0, 1).
+    fn fill_1d(&self, pixel: PixelKey, first: u32, dim: &Dim1, out: &mut [f32]);
+    /// Coordinate pairs of samples `first .. first + x.len()`, each in [0, 1); `x` and `y` are of one length.
+    fn fill_2d(&self, pixel: PixelKey, first: u32, dim: &Dim2, x: &mut [f32], y: &mut [f32]);
+
+    /// One coordinate pair.
+    fn get_2d(&self, pixel: PixelKey, index: u32, dim: &Dim2) -> [f32; 2] {
+        let (mut x, mut y) = ([0.0], [0.0]);
+        self.fill_2d(pixel, index, dim, &mut x, &mut y);
+        [x[0], y[0]]
+    }
+
+    /// One coordinate.
+    fn get_1d(&self, pixel: PixelKey, index: u32, dim: &Dim1) -> f32 {
+        let mut x = [0.0];
+        self.fill_1d(pixel, index, dim, &mut x);
+        x[0]
+    }
+}
+
+/// A sampler for each decision of a layout, for one count of samples and one seed (a replicate has its own).
+#[derive(Debug, Clone)]
+pub struct Sampler {
+    decisions: [Option<DecisionSampler>; 4],
+    samples: u32,
+}
+
+/// Which sampler serves which decision.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SamplerSet {
+    by_decision: [SamplerSpec; 4],
+}
+
+impl From<SamplerSpec> for SamplerSet {
+    fn from(spec: SamplerSpec) -> Self {
+        Self { by_decision: [spec; 4] }
+    }
+}
+
+impl SamplerSet {
+    /// The sampler of a decision.
+    pub fn of(&self, decision: Decision) -> SamplerSpec {
+        self.by_decision[decision as usize]
+    }
+
+    /// Samples taken where `asked` are asked for, by the decisions that `layout` makes.
+    pub fn taken(&self, asked: u32, layout: &SampleLayout) -> u32 {
+        layout.claims().iter().map(|c| self.of(c.decision).taken(asked)).max().unwrap_or(asked)
+    }
+
+    /// Whether anything that `layout` uses is random.
+    pub fn is_random(&self, layout: &SampleLayout) -> bool {
+        layout.claims().iter().any(|c| {
+            let spec = self.of(c.decision);
+            // The sheet's 1-D samplers are jittered also where its 2-D ones are not.
+            spec.is_random() || (spec.sheet_1d && c.count == 1)
+        })
+    }
+}
+
+impl Sampler {
+    /// Readies `set` for `asked` samples per pixel of a scene with this layout.
+    ///
+    /// # Errors
+    /// Kind `Input` where a count is 0 or above 2²⁴, or `center` is asked for a decision about lights.
+    pub fn new(set: impl Into<SamplerSet>, layout: &SampleLayout, asked: u32, seed: u64) -> Result<Self> {
+        let set = set.into();
+        if asked == 0 || asked > MAX_SAMPLES {
+            return Err(Error::input("samples per pixel", format!("expected 1 to {MAX_SAMPLES}, found {asked}")));
+        }
+        let samples = set.taken(asked, layout);
+        let mut decisions = [const { None }; 4];
+        for &claim in layout.claims() {
+            let spec = set.of(claim.decision);
+            if spec.points == Points::Center && !matches!(claim.decision, Decision::Pixel | Decision::Lens) {
+                return Err(Error::input(
+                    "sampler \"center\"",
+                    format!(
+                        "expected a sampler with numbers for the decision \"{}\", found center",
+                        claim.decision.name()
+                    ),
+                ));
+            }
+            decisions[claim.decision as usize] = Some(DecisionSampler::new(spec, claim, samples, seed));
+        }
+        Ok(Self { decisions, samples })
+    }
+
+    fn decision(&self, decision: Decision) -> &DecisionSampler {
+        self.decisions[decision as usize]
+            .as_ref()
+            .expect("a ticket is read by a sampler made for the layout that gave it")
+    }
+}
+
+impl PointSource for Sampler {
+    fn samples(&self) -> u32 {
+        self.samples
+    }
+
+    fn fill_1d(&self, pixel: PixelKey, first: u32, dim: &Dim1, out: &mut [f32]) {
+        let source = self.decision(dim.decision());
+        let keys = source.keys(pixel);
+        for (i, out) in (first..).zip(out) {
+            *out = unit_f32(source.fraction(0, source.place(i, &keys), &keys));
+        }
+    }
+
+    fn fill_2d(&self, pixel: PixelKey, first: u32, dim: &Dim2, x: &mut [f32], y: &mut [f32]) {
+        assert_eq!(x.len(), y.len());
+        let source = self.decision(dim.decision());
+        if source.spec.points == Points::Center {
+            x.fill(0.5);
+            y.fill(0.5);
+            return;
+        }
+        let keys = source.keys(pixel);
+        for (i, (x, y)) in (first..).zip(x.iter_mut().zip(y)) {
+            let place = source.place(i, &keys);
+            *x = unit_f32(source.fraction(0, place, &keys));
+            *y = unit_f32(source.fraction(1, place, &keys));
+        }
+    }
+}
+
+/// One decision's numbers: the specification made ready.
+#[derive(Debug, Clone)]
+struct DecisionSampler {
+    spec: SamplerSpec,
+    /// 1-D decisions of stratified sets, and of the sheet's presets, have n strata on a line.
+    strata: (u32, u32),
+    samples: u32,
+    axes: [Axis; 2],
+    random_key: u64,
+    shuffle_key: u64,
+}
+
+/// One coordinate of a point set, ready to look up.
+#[derive(Debug, Clone)]
+struct Axis {
+    /// Number of the set's dimension: keys depend on it.
+    dimension: u32,
+    kind: AxisKind,
+}
+
+#[derive(Debug, Clone)]
+enum AxisKind {
+    Uniform,
+    StratifiedX,
+    StratifiedY,
+    Halton { base: u32, digits: u32 },
+    HammersleyX,
+    VanDerCorput,
+    Sobol(SobolAxis),
+}
+
+/// The keys of one decision in one pixel.
+struct Keys {
+    axes: [u64; 2],
+    shuffle: u64,
+}
+
+const RANDOM_TAG: u64 = 1;
+const SHUFFLE_TAG: u64 = 2;
+
+impl DecisionSampler {
+    fn new(mut spec: SamplerSpec, claim: Claim, samples: u32, seed: u64) -> Self {
+        let decision = claim.decision as u64;
+        let one_d = claim.count == 1;
+        if one_d && spec.sheet_1d {
+            // The sheet's own 1-D sampler: strata, also where the 2-D set is another.
+            spec = SamplerSpec { points: Points::Stratified, order: Order::Step, random: Random::Jitter, ..spec };
+        }
+        let first = if spec.order == Order::Joint { claim.first } else { 0 };
+        let axis = |axis: u32| {
+            let dimension = first + axis;
+            let kind = match (spec.points, axis) {
+                (Points::Uniform | Points::Center, _) => AxisKind::Uniform,
+                (Points::Stratified, 0) => AxisKind::StratifiedX,
+                (Points::Stratified, _) => AxisKind::StratifiedY,
+                (Points::Halton, _) => {
+                    let base = PRIMES[dimension as usize];
+                    AxisKind::Halton { base, digits: digit_count(base, samples) }
+                }
+                (Points::Hammersley, 0) => AxisKind::HammersleyX,
+                (Points::Hammersley, _) => AxisKind::VanDerCorput,
+                (Points::Ld, 0) => AxisKind::VanDerCorput,
+                (Points::Ld | Points::Sobol, _) => {
+                    AxisKind::Sobol(SobolAxis::new(dimension).expect("a layout has fewer than 256 dimensions"))
+                }
+            };
+            Axis { dimension, kind }
+        };
+        let strata = match (spec.points, one_d) {
+            (Points::Stratified, false) => {
+                let (a, b) = factor_pair(samples).expect("the count taken by a stratified sampler has a factor pair");
+                (b, a)
+            }
+            _ => (samples, 1),
+        };
+        let random_path: &[u64] = match spec.scope {
+            Scope::Decision | Scope::Each => &[RANDOM_TAG, decision],
+            Scope::Image | Scope::Pixel => &[RANDOM_TAG],
+        };
+        Self {
+            spec,
+            strata,
+            samples,
+            axes: [axis(0), axis(1)],
+            random_key: derive(seed, random_path),
+            shuffle_key: derive(seed, &[SHUFFLE_TAG, decision]),
+        }
+    }
+
+    #[inline]
+    fn keys(&self, pixel: PixelKey) -> Keys {
+        let of_pixel = match self.spec.scope {
+            Scope::Pixel | Scope::Each => mix64(pixel.0.wrapping_add(0x51_7cc1_b727_220a)),
+            Scope::Image | Scope::Decision => 0,
+        };
+        let key = |base: u64, word: u64| mix64(base ^ of_pixel.wrapping_add(word.wrapping_mul(0xd6e8_feb8_6659_fd93)));
+        Keys {
+            axes: [0, 1].map(|a: usize| key(self.random_key, u64::from(self.axes[a].dimension) + 1)),
+            shuffle: key(self.shuffle_key, 0),
+        }
+    }
+
+    /// π(i).
+    #[inline(always)]
+    fn place(&self, index: u32, keys: &Keys) -> u32 {
+        debug_assert!(index < self.samples, "sample {index} of {}", self.samples);
+        if self.spec.order == Order::Shuffle { permute(index, self.samples, keys.shuffle) } else { index }
+    }
+
+    /// R(P(i, axis)) as a 32-bit fraction.
+    #[inline(always)]
+    fn fraction(&self, axis: usize, i: u32, keys: &Keys) -> u32 {
+        let key = keys.axes[axis];
+        let plain = match &self.axes[axis].kind {
+            AxisKind::Uniform => return bits32(key, i),
+            AxisKind::StratifiedX => return in_stratum(i % self.strata.0, self.strata.0, bits32(key, i)),
+            AxisKind::StratifiedY => return in_stratum(i / self.strata.0, self.strata.1, bits32(key, i)),
+            AxisKind::Halton { base, digits } if self.spec.random == Random::Digits => {
+                return digit_scrambled(*base, *digits, i, key);
+            }
+            AxisKind::Halton { base, .. } => radical_inverse(*base, i),
+            AxisKind::HammersleyX if self.spec.random == Random::Yxor => return in_stratum(i, self.samples, 0),
+            AxisKind::HammersleyX => in_stratum(i, self.samples, 0),
+            AxisKind::VanDerCorput => i.reverse_bits(),
+            AxisKind::Sobol(sobol) => sobol.fraction(i),
+        };
+        // Keys are well mixed: their halves serve as words.
+        match self.spec.random {
+            Random::Xor | Random::Yxor => plain ^ key as u32,
+            Random::Shift => plain.wrapping_add(key as u32),
+            Random::Owen => owen_scramble(plain, key as u32),
+            Random::None | Random::Fresh | Random::Jitter | Random::Digits => plain,
+        }
+    }
+
+    /// The same value correctly rounded to f64 where the 32-bit fraction is not exact.
+    fn coordinate_f64(&self, axis: usize, i: u32, keys: &Keys) -> f64 {
+        let key = keys.axes[axis];
+        match (&self.axes[axis].kind, self.spec.random) {
+            (AxisKind::Halton { base, .. }, Random::None) => radical_inverse_f64(*base, i),
+            (AxisKind::HammersleyX, Random::None | Random::Yxor) => f64::from(i) / f64::from(self.samples),
+            (AxisKind::StratifiedX, _) => in_stratum_f64(i % self.strata.0, self.strata.0, bits32(key, i)),
+            (AxisKind::StratifiedY, _) => in_stratum_f64(i / self.strata.0, self.strata.1, bits32(key, i)),
+            _ => f64::from(self.fraction(axis, i, keys)) / 4_294_967_296.0,
+        }
+    }
+}
+
+/// The 2-D point set that `spec` gives a pixel's first decision, in f64: for measuring, plotting and writing down.
+///
+/// The set is that of pixel (0, 0) under `seed`. Coordinates are in [0, 1), correctly rounded where they are rationals
+/// (the renderer reads the top 24 bits of the same fractions).
+///
+/// # Errors
+/// Kind `Input` where `asked` is 0 or above 2²⁴, or the sampler is `center`.
+pub fn point_set(spec: SamplerSpec, asked: u32, seed: u64) -> Result<Vec<[f64; 2]>> {
+    if spec.points == Points::Center {
+        return Err(Error::input(
+            "sampler \"center\"",
+            "expected a sampler with numbers, found center, which has none",
+        ));
+    }
+    let mut layout = SampleLayout::default();
+    let _ticket = layout.claim_2d(Decision::Pixel);
+    let sampler = Sampler::new(spec, &layout, asked, seed)?;
+    let source = sampler.decision(Decision::Pixel);
+    let keys = source.keys(PixelKey::new(0, 0));
+    Ok((0..sampler.samples)
+        .map(|i| {
+            let place = source.place(i, &keys);
+            [0, 1].map(|axis| source.coordinate_f64(axis, place, &keys))
+        })
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::spec::{Preset, every_legal_spec};
+    use super::*;
+
+    fn spec(text: &str) -> SamplerSpec {
+        SamplerSpec::parse(text, Preset::Best).unwrap()
+    }
+
+    struct Tickets {
+        layout: SampleLayout,
+        pixel: Dim2,
+        lens: Dim2,
+        pick: Dim1,
+        light: Dim2,
+    }
+
+    fn tickets() -> Tickets {
+        let mut layout = SampleLayout::default();
+        let pixel = layout.claim_2d(Decision::Pixel);
+        let lens = layout.claim_2d(Decision::Lens);
+        let pick = layout.claim_1d(Decision::LightPick);
+        let light = layout.claim_2d(Decision::LightPoint);
+        Tickets { layout, pixel, lens, pick, light }
+    }
+
+    #[test]
+    fn spans_equal_single_look_ups_in_any_order_for_every_legal_sampler() {
+        let t = tickets();
+        for s in every_legal_spec().into_iter().filter(|s| s.points != Points::Center) {
+            for asked in [1, 7, 16, 26, 33] {
+                let sampler = Sampler::new(s, &t.layout, asked, 42).unwrap();
+                let n = sampler.samples() as usize;
+                let pixel = PixelKey::new(3, 5);
+                for dim in [&t.light, &t.pixel, &t.lens] {
+                    let (mut x, mut y) = (vec![0.0; n], vec![0.0; n]);
+                    sampler.fill_2d(pixel, 0, dim, &mut x, &mut y);
+                    for i in (0..n).rev() {
+                        assert_eq!(sampler.get_2d(pixel, i as u32, dim), [x[i], y[i]], "{s}");
+                        assert!((0.0..1.0).contains(&x[i]) && (0.0..1.0).contains(&y[i]), "{s}");
+                    }
+                }
+                let mut x = vec![0.0; n];
+                sampler.fill_1d(pixel, 0, &t.pick, &mut x);
+                assert!((0..n).all(|i| sampler.get_1d(pixel, i as u32, &t.pick) == x[i] && x[i] < 1.0), "{s}");
+            }
+        }
+    }
+
+    #[test]
+    fn f64_points_are_the_renderers_numbers_before_truncation() {
+        let t = tickets();
+        for s in every_legal_spec().into_iter().filter(|s| s.points != Points::Center) {
+            let sampler = Sampler::new(s, &t.layout, 48, 9).unwrap();
+            for (i, point) in point_set(s, 48, 9).unwrap().into_iter().enumerate() {
+                let used = sampler.get_2d(PixelKey::new(0, 0), i as u32, &t.pixel);
+                for (exact, used) in point.into_iter().zip(used) {
+                    let below = exact - f64::from(used);
+                    // Truncation to 24 bits, and one rounding down to 32 bits before it.
+                    assert!((-f64::EPSILON..2f64.powi(-24) + 2f64.powi(-32)).contains(&below), "{s}: {below:e}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn scopes_share_keys_exactly_where_they_say() {
+        let t = tickets();
+        let same = |scope: Scope, order: &str| {
+            let s = spec(&format!("ld:{order}:xor@{}", scope.word()));
+            let sampler = Sampler::new(s, &t.layout, 16, 1).unwrap();
+            let set = |pixel, dim: &Dim2| {
+                let mut points: Vec<[f32; 2]> = (0..16).map(|i| sampler.get_2d(pixel, i, dim)).collect();
+                points.sort_by(|a, b| a.partial_cmp(b).unwrap());
+                points
+            };
+            let (a, b) = (PixelKey::new(0, 0), PixelKey::new(1, 0));
+            (set(a, &t.pixel) == set(b, &t.pixel), set(a, &t.pixel) == set(a, &t.lens))
+        };
+        for order in ["step", "shuffle"] {
+            assert_eq!(same(Scope::Image, order), (true, true));
+            assert_eq!(same(Scope::Decision, order), (true, false));
+            assert_eq!(same(Scope::Pixel, order), (false, true));
+            assert_eq!(same(Scope::Each, order), (false, false));
+        }
+    }
+
+    #[test]
+    fn the_sheets_one_dimensional_sampler_is_strata_and_uniform_for_uniform() {
+        let t = tickets();
+        for name in ["stratified:sheet", "halton:sheet", "hammersley:sheet", "ld:sheet"] {
+            let sampler = Sampler::new(spec(name), &t.layout, 16, 1).unwrap();
+            for i in 0..16 {
+                let u = sampler.get_1d(PixelKey::new(2, 2), i, &t.pick);
+                assert_eq!((u * 16.0) as u32, i, "{name}");
+            }
+        }
+        assert!(SamplerSet::from(spec("halton:sheet")).is_random(&t.layout));
+        let mut no_pick = SampleLayout::default();
+        no_pick.claim_2d(Decision::Pixel);
+        assert!(!SamplerSet::from(spec("halton:sheet")).is_random(&no_pick));
+    }
+
+    #[test]
+    fn counts_outside_their_range_are_refused() {
+        let t = tickets();
+        for asked in [0, MAX_SAMPLES + 1, u32::MAX] {
+            assert_eq!(Sampler::new(spec("ld"), &t.layout, asked, 0).unwrap_err().exit_code(), 2);
+        }
+        assert!(Sampler::new(spec("center"), &t.layout, 4, 0).unwrap_err().to_string().contains("light pick"));
+        assert!(Sampler::new(spec("hammersley"), &t.layout, MAX_SAMPLES, 0).is_ok());
+    }
+}
