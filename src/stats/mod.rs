@@ -1,1 +1,22 @@
-//! Statistics: discrepancies, moments, image errors, fits and tests.
+//! Statistics: how even a point set is, how wrong an image is, and how sure one may be of either.
+//!
+//! Pure functions of numbers: no files, no clock, no global state, and the same bits on every machine (sums are
+//! compensated and in a fixed order, transcendental functions come from crate `libm`).
+//!
+//! | question | module |
+//! |---|---|
+//! | mean, variance, intervals | [`moments`] |
+//! | how far is an image from its reference | [`image_error`] |
+//! | how fast does the error fall | [`fit`] |
+//! | does an estimator agree with the truth | [`hypothesis`] |
+
+pub mod fit;
+pub mod hypothesis;
+pub mod image_error;
+pub mod moments;
+mod special;
+
+pub use fit::{IntervalKind, LineFit, SlopeFit, loglog_slope, slope_with_interval};
+pub use hypothesis::{Family, Outcome, Verdict, chi2_test, t_test, z_test};
+pub use image_error::Ensemble;
+pub use moments::{Estimate, Moments, jackknife, sum, t_interval};
