@@ -7,9 +7,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use sampler_lab::error::{Error, Result};
-use sampler_lab::experiment::backend::{
-    Algorithms, Backend, PointMetrics, RenderRequest, SamplerFacts, SceneFacts, Size, Stage,
-};
+use sampler_lab::experiment::backend::{Algorithms, Backend, PointMetrics, RenderRequest, SceneFacts, Size, Stage};
 use sampler_lab::experiment::execute::{Options, Outcome, execute};
 use sampler_lab::experiment::plan::{Plan, Work, plan, refuse_equal_seeds};
 use sampler_lab::experiment::progress::{Progress, Silent, Tick};
@@ -80,7 +78,7 @@ impl Backend for Toy {
         })
     }
 
-    fn parse_sampler(&self, text: &str) -> Result<SamplerFacts> {
+    fn parse_sampler(&self, text: &str) -> Result<String> {
         let canonical = match text {
             "fresh" | "fresh:sheet" | "fresh:best" => "fresh:step",
             "grid" => "grid:none",
@@ -89,15 +87,23 @@ impl Backend for Toy {
             "truth" => "truth:owen",
             _ => return Err(Error::input(text, "expected one of the samplers fresh grid strata net truth")),
         };
-        Ok(SamplerFacts { canonical: canonical.to_owned(), is_random: text != "grid" })
+        Ok(canonical.to_owned())
     }
 
-    fn taken(&self, canonical: &str, asked: u32) -> u32 {
+    fn is_random(&self, canonical: &str, _: Option<&str>) -> bool {
+        canonical != "grid:none"
+    }
+
+    fn taken(&self, canonical: &str, _: Option<&str>, asked: u32) -> u32 {
         if canonical.starts_with("strata") { asked.next_multiple_of(2) } else { asked }
     }
 
     fn algorithms(&self, _: &str) -> Algorithms {
         self.numbers
+    }
+
+    fn prepare(&self, _: &RenderRequest) -> Result<()> {
+        Ok(())
     }
 
     fn render(&self, request: &RenderRequest) -> Result<Image> {
@@ -112,7 +118,7 @@ impl Backend for Toy {
         for (i, pixel) in image.pixels.iter_mut().enumerate() {
             for (c, value) in pixel.iter_mut().enumerate() {
                 let random = mix(seed ^ mix(3 * i as u64 + c as u64)) as f64 / 2f64.powi(64) - 0.5;
-                *value += (random / f64::from(self.taken(sampler, spp)).sqrt()) as f32 + self.drift.get();
+                *value += (random / f64::from(self.taken(sampler, None, spp)).sqrt()) as f32 + self.drift.get();
             }
         }
         Ok(image)
@@ -128,7 +134,7 @@ impl Backend for Toy {
     }
 
     fn point_metrics(&self, canonical: &str, n: u32, seed: u64, metrics: &[String]) -> Result<PointMetrics> {
-        let n = self.taken(canonical, n);
+        let n = self.taken(canonical, None, n);
         let value = |name: &String| (name == "star").then(|| (mix(seed) % 1000) as f64 / (1000.0 * f64::from(n)));
         Ok(metrics.iter().map(|name| (name.clone(), value(name))).collect())
     }
@@ -210,6 +216,18 @@ fn identities(plan: &Plan) -> HashMap<String, (String, Option<u64>)> {
     plan.items.iter().map(|item| (item.label(), (item.id.clone(), item.seed()))).collect()
 }
 
+// --- files ---
+
+#[test]
+fn the_experiments_that_come_with_the_lab_read() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/experiments");
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let experiment = Experiment::read(&path).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(path.file_stem().unwrap().to_str(), Some(experiment.name.as_str()));
+    }
+}
+
 // --- plans ---
 
 #[test]
@@ -240,8 +258,8 @@ fn two_names_of_one_sampler_are_done_once_and_said() {
         "{:?}",
         plan.notes
     );
-    assert!(plan.notes.iter().any(|note| note.contains("grid has nothing random")), "{:?}", plan.notes);
-    assert!(plan.notes.iter().any(|note| note == "strata: 1 spp asked, 2 taken"), "{:?}", plan.notes);
+    assert!(plan.notes.iter().any(|note| note.contains("ramp, grid: nothing random")), "{:?}", plan.notes);
+    assert!(plan.notes.iter().any(|note| note == "ramp, strata: 1 spp asked, 2 taken"), "{:?}", plan.notes);
 }
 
 #[test]
@@ -358,7 +376,7 @@ fn what_cannot_be_planned_is_refused_with_its_place() {
     }
     let text = SMALL.replace("\"grid\", ", "").replace("\"sampler\": \"truth\"", "\"sampler\": \"grid\"");
     let error = plan(&experiment(&text), &Toy::new()).unwrap_err();
-    assert!(error.what.contains("both halves would be one image"), "{error}");
+    assert!(error.what.contains("both halves of ramp would be one image"), "{error}");
 }
 
 // --- runs ---

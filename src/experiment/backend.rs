@@ -141,15 +141,6 @@ pub struct SceneFacts {
     pub memory_bytes: u64,
 }
 
-/// What a plan needs to know of a sampler.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SamplerFacts {
-    /// The full form `POINTS:ORDER:RANDOM@SCOPE`; two texts that mean the same sampler have the same one.
-    pub canonical: String,
-    /// Whether another seed gives other points. Without that there is nothing to replicate.
-    pub is_random: bool,
-}
-
 /// Numbers that stand for the code behind an item: each is raised when, and only when, that code's bits change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Algorithms {
@@ -200,17 +191,29 @@ pub trait Backend {
     /// Kind `Input` where the scene cannot be read.
     fn open_scene(&self, scene: &str) -> Result<SceneFacts>;
 
-    /// Reads a sampler's text; a bare name means its `:best` preset.
+    /// The canonical form of a sampler's text: texts that mean the same sampler have the same one, and it is a text
+    /// for the same sampler itself. A bare name means its `:best` preset.
     ///
     /// # Errors
     /// Kind `Input` with the legal combinations.
-    fn parse_sampler(&self, text: &str) -> Result<SamplerFacts>;
+    fn parse_sampler(&self, text: &str) -> Result<String>;
 
-    /// The number of samples that the sampler takes where `asked` are asked for; at least `asked`.
-    fn taken(&self, canonical: &str, asked: u32) -> u32;
+    /// Whether another seed gives another image of the scene, or another point set where no scene is given. Without
+    /// that there is nothing to replicate. It is a question about both: a sampler may draw for some decisions only.
+    fn is_random(&self, canonical: &str, scene: Option<&str>) -> bool;
+
+    /// The number of samples that the sampler takes for the scene (or of points, where none is given) where `asked`
+    /// are asked for; at least `asked`.
+    fn taken(&self, canonical: &str, scene: Option<&str>, asked: u32) -> u32;
 
     /// The algorithm numbers behind items of this sampler.
     fn algorithms(&self, canonical: &str) -> Algorithms;
+
+    /// Does what rendering needs once and should not be timed with it: compiles the scene, starts the threads.
+    ///
+    /// # Errors
+    /// Kind `Input` where the scene cannot be compiled.
+    fn prepare(&self, request: &RenderRequest) -> Result<()>;
 
     /// Renders one image. Every pixel is finite.
     ///

@@ -452,9 +452,13 @@ impl<'a> Run<'a> {
 
     /// Makes an image, times it, and saves it; `pixels` is what a row says of it.
     fn make(&mut self, item: &WorkItem, size: Size, pixels: Option<&str>) -> Result<Arc<Image>> {
+        let request = self.request(item);
+        if let Some(request) = &request {
+            self.backend.prepare(request)?;
+        }
         let load = machine::load();
         let started = Instant::now();
-        let image = self.pixels_of(item, size)?;
+        let image = self.pixels_of(item, request.as_ref(), size)?;
         let seconds = started.elapsed().as_secs_f64();
         measure::check_finite(&image, &item.label())?;
         let found = pixel_hash(&image.pixels);
@@ -478,21 +482,27 @@ impl<'a> Run<'a> {
         self.images.save(&item.id, image, &provenance)
     }
 
+    /// What to ask the backend for, where the image is rendered.
+    fn request<'w>(&self, item: &'w WorkItem) -> Option<RenderRequest<'w>> {
+        let Work::Image(work) = &item.work else { return None };
+        Some(RenderRequest {
+            scene: &work.scene,
+            sampler: &work.sampler,
+            spp: work.spp.asked,
+            seed: work.seed,
+            size: work.size,
+            estimator: work.estimator,
+            stage: work.stage,
+            threads: self.options.threads,
+        })
+    }
+
     /// The bare pixels.
-    fn pixels_of(&self, item: &WorkItem, size: Size) -> Result<Image> {
-        let image = match &item.work {
-            Work::Image(work) => self.backend.render(&RenderRequest {
-                scene: &work.scene,
-                sampler: &work.sampler,
-                spp: work.spp.asked,
-                seed: work.seed,
-                size,
-                estimator: work.estimator,
-                stage: work.stage,
-                threads: self.options.threads,
-            }),
-            Work::Reference(work) => self.backend.exact_reference(&work.scene, size),
-            Work::Ensemble(_) | Work::Points(_) => unreachable!("these keep no image"),
+    fn pixels_of(&self, item: &WorkItem, request: Option<&RenderRequest>, size: Size) -> Result<Image> {
+        let image = match (request, &item.work) {
+            (Some(request), _) => self.backend.render(request),
+            (None, Work::Reference(work)) => self.backend.exact_reference(&work.scene, size),
+            (None, _) => unreachable!("these keep no image"),
         }?;
         assert_eq!((image.width, image.height), (size.width, size.height), "an image of another size than asked for");
         Ok(image)

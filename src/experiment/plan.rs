@@ -7,7 +7,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::backend::{Algorithms, Backend, Estimator, SamplerFacts, SceneFacts, Size, Stage};
+use super::backend::{Algorithms, Backend, Estimator, SceneFacts, Size, Stage};
 use super::identity::{Fingerprint, SeedOf};
 use super::results::{Count, Kind};
 use super::spec::{Experiment, Pictures};
@@ -214,8 +214,6 @@ pub struct PlannedSampler {
     pub canonical: String,
     /// The texts of the experiment that mean it.
     pub names: Vec<String>,
-    /// Whether there is anything to replicate.
-    pub is_random: bool,
 }
 
 /// All items of an experiment in the order in which they are done and recorded.
@@ -306,7 +304,7 @@ impl Plan {
 pub fn plan(experiment: &Experiment, backend: &dyn Backend) -> Result<Plan> {
     let scenes = open_scenes(experiment, backend)?;
     let samplers = read_samplers(experiment, backend)?;
-    let reference_sampler = read_reference_sampler(experiment, backend, &samplers)?;
+    let reference_sampler = read_reference_sampler(experiment, backend, &samplers, &scenes)?;
     check_metrics(experiment, backend)?;
     let mut planner = Planner {
         experiment,
@@ -372,17 +370,17 @@ fn open_scenes(experiment: &Experiment, backend: &dyn Backend) -> Result<Vec<Sce
 fn read_samplers(experiment: &Experiment, backend: &dyn Backend) -> Result<Vec<PlannedSampler>> {
     let mut samplers: Vec<PlannedSampler> = Vec::new();
     for (i, text) in experiment.samplers.iter().enumerate() {
-        let SamplerFacts { canonical, is_random } = read_sampler(text, &format!("samplers[{i}]"), experiment, backend)?;
+        let canonical = read_sampler(text, &format!("samplers[{i}]"), experiment, backend)?;
         match samplers.iter_mut().find(|known| known.canonical == canonical) {
             Some(known) => known.names.push(text.clone()),
-            None => samplers.push(PlannedSampler { canonical, names: vec![text.clone()], is_random }),
+            None => samplers.push(PlannedSampler { canonical, names: vec![text.clone()] }),
         }
     }
     Ok(samplers)
 }
 
 /// Reads one sampler; the message says where in the experiment it stands.
-fn read_sampler(text: &str, key: &str, experiment: &Experiment, backend: &dyn Backend) -> Result<SamplerFacts> {
+fn read_sampler(text: &str, key: &str, experiment: &Experiment, backend: &dyn Backend) -> Result<String> {
     let place = |error: Error| Error { place: format!("{}: {key}: {}", experiment.place, error.place), ..error };
     backend.parse_sampler(text).map_err(place)
 }
@@ -392,9 +390,10 @@ fn read_reference_sampler(
     experiment: &Experiment,
     backend: &dyn Backend,
     samplers: &[PlannedSampler],
+    scenes: &[SceneFacts],
 ) -> Result<PlannedSampler> {
     let text = &experiment.reference.sampler;
-    let SamplerFacts { canonical, is_random } = read_sampler(text, "reference.sampler", experiment, backend)?;
+    let canonical = read_sampler(text, "reference.sampler", experiment, backend)?;
     let refuse = |what: String| Err(Error::input(format!("{}: reference.sampler", experiment.place), what));
     if let Some(compared) = samplers.iter().find(|sampler| sampler.canonical == canonical) {
         let names = compared.names.join(" and ");
@@ -402,12 +401,14 @@ fn read_reference_sampler(
             "expected a sampler that is not compared, found {text:?}, which is {names}: {canonical}"
         ));
     }
-    if !is_random {
+    let is_fixed = |scene: &&SceneFacts| !scene.exact_reference && !backend.is_random(&canonical, Some(&scene.name));
+    if let Some(scene) = scenes.iter().find(is_fixed) {
         return refuse(format!(
-            "expected a sampler with something random in it, found {text:?}, which is {canonical}: both halves would be one image"
+            "expected a sampler with something random in it, found {text:?}, which is {canonical}: both halves of {} would be one image",
+            scene.name
         ));
     }
-    Ok(PlannedSampler { canonical, names: vec![text.clone()], is_random })
+    Ok(PlannedSampler { canonical, names: vec![text.clone()] })
 }
 
 /// Every metric asked for has to be known.
@@ -446,27 +447,36 @@ impl Planner<'_> {
                 let what = format!("{} and {last} are one sampler, {}: done once", first.join(", "), sampler.canonical);
                 self.notes.push(what);
             }
-            if !sampler.is_random && self.experiment.replicates > 1 {
-                let names = sampler.names.join(", ");
-                self.notes.push(format!("{names} has nothing random in it: 1 replicate, no variance"));
+        }
+    }
+
+    /// Says what becomes of replicates and spp in one scene.
+    fn note_scene(&mut self, scene: &SceneFacts, samplers: &[PlannedSampler]) {
+        if scene.exact_reference {
+            self.notes.push(format!("{}: the reference is a closed form", scene.name));
+        }
+        for sampler in samplers {
+            let what = format!("{}, {}", scene.name, sampler.names.join(", "));
+            if self.experiment.replicates > 1 && !self.backend.is_random(&sampler.canonical, Some(&scene.name)) {
+                self.notes.push(format!("{what}: nothing random, so 1 replicate and no variance"));
             }
             for &asked in &self.experiment.spp {
-                let taken = self.backend.taken(&sampler.canonical, asked);
+                let Count { taken, .. } = self.count(&sampler.canonical, Some(scene), asked);
                 if taken != asked {
-                    self.notes.push(format!("{}: {asked} spp asked, {taken} taken", sampler.names.join(", ")));
+                    self.notes.push(format!("{what}: {asked} spp asked, {taken} taken"));
                 }
             }
         }
     }
 
-    /// Counts of a sampler.
-    fn count(&self, sampler: &str, asked: u32) -> Count {
-        Count { asked, taken: self.backend.taken(sampler, asked) }
+    /// Counts of a sampler for a scene, or of a point set where there is none.
+    fn count(&self, sampler: &str, scene: Option<&SceneFacts>, asked: u32) -> Count {
+        Count { asked, taken: self.backend.taken(sampler, scene.map(|scene| scene.name.as_str()), asked) }
     }
 
     /// Replicates worth making.
-    fn replicates(sampler: &PlannedSampler, asked: u32) -> u32 {
-        if sampler.is_random { asked } else { 1 }
+    fn replicates(&self, sampler: &str, scene: Option<&SceneFacts>, asked: u32) -> u32 {
+        if self.backend.is_random(sampler, scene.map(|scene| scene.name.as_str())) { asked } else { 1 }
     }
 
     /// Adds an item unless the same one is there already, and gives its id.
@@ -483,7 +493,7 @@ impl Planner<'_> {
         let Some(points) = &self.experiment.points else { return };
         for sampler in samplers {
             for &asked in &points.n {
-                for replicate in 0..Self::replicates(sampler, points.replicates) {
+                for replicate in 0..self.replicates(&sampler.canonical, None, points.replicates) {
                     self.add_point_set(&sampler.canonical, asked, replicate, &points.metrics);
                 }
             }
@@ -492,7 +502,7 @@ impl Planner<'_> {
 
     /// Point-set metrics of one set.
     fn add_point_set(&mut self, sampler: &str, asked: u32, replicate: u32, metrics: &[String]) {
-        let n = self.count(sampler, asked);
+        let n = self.count(sampler, None, asked);
         let seed = self.seed("points", "", sampler, asked, replicate);
         let numbers = self.backend.algorithms(sampler);
         let id = Fingerprint::new("points")
@@ -511,6 +521,7 @@ impl Planner<'_> {
 
     /// One scene: its reference, then sampler by sampler and spp by spp the replicates and what they say together.
     fn add_statistics(&mut self, scene: &SceneFacts, size: Size, samplers: &[PlannedSampler]) {
+        self.note_scene(scene, samplers);
         let reference_id = self.add_reference(scene, size, self.experiment.reference.spp, "reference");
         for sampler in samplers {
             for &asked in &self.experiment.spp {
@@ -529,8 +540,8 @@ impl Planner<'_> {
         reference_id: &str,
     ) {
         let estimator = self.experiment.estimator;
-        let spp = self.count(&sampler.canonical, asked);
-        let members: Vec<String> = (0..Self::replicates(sampler, self.experiment.replicates))
+        let spp = self.count(&sampler.canonical, Some(scene), asked);
+        let members: Vec<String> = (0..self.replicates(&sampler.canonical, Some(scene), self.experiment.replicates))
             .map(|replicate| {
                 let work = ImageWork {
                     kind: Kind::Render,
@@ -577,7 +588,7 @@ impl Planner<'_> {
                 .id();
             (id, ReferenceSource::Exact)
         } else {
-            let spp = self.count(&sampler, asked);
+            let spp = self.count(&sampler, Some(scene), asked);
             let ids = [0, 1].map(|half| self.add_half(scene, size, spp, half, purpose));
             let id = Fingerprint::new("reference").with("halves", ids.join(",")).id();
             (id, ReferenceSource::Halves { ids, sampler, spp })
@@ -612,7 +623,7 @@ impl Planner<'_> {
                 kind: Kind::Picture,
                 scene: scene.name.clone(),
                 sampler: sampler.canonical.clone(),
-                spp: self.count(&sampler.canonical, pictures.spp),
+                spp: self.count(&sampler.canonical, Some(scene), pictures.spp),
                 replicate: 0,
                 seed: self.seed("picture", &scene.name, &sampler.canonical, pictures.spp, 0),
                 size: pictures.size,
@@ -636,7 +647,7 @@ impl Planner<'_> {
         let work = ImageWork {
             kind: Kind::Stage,
             scene: scene.name.clone(),
-            spp: self.count(&sampler, asked),
+            spp: self.count(&sampler, Some(scene), asked),
             replicate: 0,
             seed: self.seed(&purpose, &scene.name, &sampler, asked, 0),
             sampler,
