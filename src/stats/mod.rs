@@ -9,13 +9,16 @@
 //! | how far is an image from its reference | [`image_error`] |
 //! | how fast does the error fall | [`fit`] |
 //! | does an estimator agree with the truth | [`hypothesis`] |
+//! | how even is a point set | [`discrepancy`] |
 
+pub mod discrepancy;
 pub mod fit;
 pub mod hypothesis;
 pub mod image_error;
 pub mod moments;
 mod special;
 
+pub use discrepancy::{L2Kind, Points, PointsError, Side, Star};
 pub use fit::{IntervalKind, LineFit, SlopeFit, loglog_slope, slope_with_interval};
 pub use hypothesis::{Family, Outcome, Verdict, chi2_test, t_test, z_test};
 pub use image_error::Ensemble;
