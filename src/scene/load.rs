@@ -1,0 +1,514 @@
+//! Opens a scene: config, OBJ meshes, MTL materials and textures become plain data, or an error that says where.
+//!
+//! Nothing is written and nothing printed; what a person should know comes back as warnings.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use glam::{DVec3, Vec2, Vec3};
+use sha2::{Digest, Sha256};
+
+use super::config::{MaterialPatch, SceneConfig};
+use super::json::suggestion;
+use super::mesh::{Material, Mesh, Texture};
+use super::obj::{self, CheckedObj, MtlMaterial};
+use crate::error::{Error, Result};
+use crate::film::srgb_decode;
+
+/// Albedo of faces without a material, and of materials without a colour.
+const DEFAULT_ALBEDO: f32 = 0.8;
+
+/// Strength of an emitter (by its name or type) that gives none.
+const DEFAULT_STRENGTH: f32 = 10.0;
+
+/// Most pixels a texture, 2^26 (8192 × 8192): its linear texels take 0.8 GB.
+const MAX_TEXELS: u64 = 1 << 26;
+
+/// Most bytes a mesh file, 2^30: reading takes about ten times as much memory.
+const MAX_MESH_BYTES: u64 = 1 << 30;
+
+/// Where to look, and what to change, beyond the scene file itself.
+#[derive(Debug, Clone, Default)]
+pub struct OpenOptions {
+    /// Folders of `--data`, searched last, in order.
+    pub data: Vec<PathBuf>,
+    /// `--set KEY=VALUE`, applied in order before anything is checked; see [`SceneConfig::parse`].
+    pub sets: Vec<String>,
+}
+
+/// One file that was read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct InputFile {
+    /// Its name as the file that refers to it writes it; for the scene file, its file name. No folder of this machine.
+    pub name: String,
+    /// SHA-256 of its bytes, 64 lower-case hexadecimal digits.
+    pub sha256: String,
+}
+
+/// A scene as its files describe it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadedScene {
+    /// The full state, every default explicit.
+    pub config: SceneConfig,
+    /// All triangles of all mesh files.
+    pub mesh: Mesh,
+    /// The files in the order they were first read: scene file, then mesh by mesh its OBJ, MTL and textures.
+    pub inputs: Vec<InputFile>,
+    /// What a person should know about the picture, one line each; emitters and simplifications among it.
+    pub warnings: Vec<String>,
+}
+
+impl LoadedScene {
+    /// SHA-256 over everything that the scene is made of: the full state (so that `--set` and defaults count, and the
+    /// scene file's layout does not) and the other files' names and bytes.
+    pub fn content_sha256(&self) -> String {
+        let mut text = self.config.to_json();
+        for input in self.inputs.iter().skip(1) {
+            text.push_str(&format!("{} {}\n", input.sha256, input.name));
+        }
+        sha256(text.as_bytes())
+    }
+}
+
+/// Reads the scene file at `config_path` and everything it refers to.
+///
+/// # Errors
+/// Kind `Input` naming the file and its line or key, what was expected and what was found: see SPEC §2 for the list.
+pub fn open(config_path: &Path, options: &OpenOptions) -> Result<LoadedScene> {
+    let mut inputs = Inputs::default();
+    let bytes =
+        inputs.read(config_path, &file_name(config_path), "a readable scene file (JSON)", config_path.display())?;
+    let config = SceneConfig::parse(&bytes, &config_path.display().to_string(), &options.sets)?;
+    let mut warnings = config.warnings();
+    if config.mesh_files.is_empty() {
+        warnings.push("scene.mesh_files is empty: the picture will be black".to_owned());
+    }
+    let places = search_places(config_path, &options.data)?;
+    let mut builder = Builder {
+        config: &config,
+        mesh: Mesh::default(),
+        inputs,
+        warnings,
+        known: Vec::new(),
+        textures: HashMap::new(),
+    };
+    for (index, name) in config.mesh_files.iter().enumerate() {
+        let key = format!("{}: scene.mesh_files[{index}]", config_path.display());
+        let path = find_mesh(name, &places, &key)?;
+        builder.add_file(index as u32, name, &path)?;
+    }
+    builder.warn_of_unmatched_patches();
+    let Builder { mesh, inputs, mut warnings, .. } = builder;
+    warnings.extend(emitter_list(&mesh, &config));
+    Ok(LoadedScene { config, mesh, inputs: inputs.files, warnings })
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// The files read so far.
+#[derive(Default)]
+struct Inputs {
+    files: Vec<InputFile>,
+}
+
+impl Inputs {
+    /// Reads `path` and records it under `name`; `place` is where it is asked for.
+    fn read(&mut self, path: &Path, name: &str, expected: &str, place: impl std::fmt::Display) -> Result<Vec<u8>> {
+        let bytes = std::fs::read(path)
+            .map_err(|e| Error::input(&place, format!("expected {expected}, found {}: {e}", path.display())))?;
+        let file = InputFile { name: name.to_owned(), sha256: sha256(&bytes) };
+        if !self.files.contains(&file) {
+            self.files.push(file);
+        }
+        Ok(bytes)
+    }
+}
+
+/// The folders in which mesh files are looked for: beside the config, `data/` of each folder above, then `--data`.
+fn search_places(config_path: &Path, data: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let absolute = std::path::absolute(config_path)
+        .map_err(|e| Error::input(config_path.display(), format!("expected a path to a file, found: {e}")))?;
+    let beside = absolute.parent().unwrap_or(&absolute);
+    let mut places = vec![beside.to_owned()];
+    places.extend(beside.ancestors().map(|folder| folder.join("data")));
+    places.extend_from_slice(data);
+    Ok(places)
+}
+
+/// The first place that has the mesh file `name`.
+fn find_mesh(name: &str, places: &[PathBuf], key: &str) -> Result<PathBuf> {
+    if let Some(found) = places.iter().map(|place| place.join(name)).find(|path| path.is_file()) {
+        return Ok(found);
+    }
+    let looked: Vec<String> = places.iter().map(|place| place.display().to_string()).collect();
+    Err(Error::input(
+        key,
+        format!("expected the mesh file {name:?}, found it in none of: {} (remedy: --data DIR)", looked.join(", ")),
+    ))
+}
+
+/// `name` relative to the folder of `referrer`; a name with backslashes that is no file there is tried with slashes.
+fn beside(referrer: &Path, name: &str) -> PathBuf {
+    let folder = referrer.parent().unwrap_or(Path::new(""));
+    let literal = folder.join(name);
+    if !literal.is_file() && name.contains('\\') { folder.join(name.replace('\\', "/")) } else { literal }
+}
+
+/// The mesh as it grows, file by file.
+struct Builder<'a> {
+    config: &'a SceneConfig,
+    mesh: Mesh,
+    inputs: Inputs,
+    warnings: Vec<String>,
+    /// Names of all materials declared, for patches.
+    known: Vec<String>,
+    /// Textures by path.
+    textures: HashMap<PathBuf, u32>,
+}
+
+impl Builder<'_> {
+    /// Adds the triangles of mesh file `file`, called `name`.
+    fn add_file(&mut self, file: u32, name: &str, path: &Path) -> Result<()> {
+        let size = std::fs::metadata(path).map(|m| m.len()).unwrap_or(0);
+        if size > MAX_MESH_BYTES {
+            return Err(Error::input(
+                name,
+                format!("expected a mesh file of at most {MAX_MESH_BYTES} bytes, found {size}"),
+            ));
+        }
+        let bytes = self.inputs.read(path, name, "a readable mesh file", name)?;
+        let mut libraries: Vec<PathBuf> = Vec::new();
+        let checked = obj::check_obj(&bytes, name, |rest, place| {
+            open_libraries(rest, place, path, &mut self.inputs, &mut self.warnings, &mut libraries)
+        })?;
+        drop(bytes);
+        self.warnings.extend(checked.warnings.iter().cloned());
+        self.known.extend(checked.materials.iter().map(|m| m.name.clone()));
+        if let Some(line) = checked.first_bare_face {
+            self.warnings.push(format!(
+                "{name}:{line}: faces before any usemtl have the default material, grey {DEFAULT_ALBEDO}"
+            ));
+        }
+        let models = read_geometry(&checked, name)?;
+        self.add_models(&models, &checked.materials, file, path)
+    }
+
+    fn add_models(&mut self, models: &[tobj::Model], declared: &[MtlMaterial], file: u32, path: &Path) -> Result<()> {
+        let name = &self.config.mesh_files[file as usize];
+        let mut index_of: HashMap<Option<usize>, u32> = HashMap::new();
+        let mut told = Told::default();
+        for model in models {
+            let first = self.mesh.len();
+            append_faces(&model.mesh, &mut self.mesh, &mut told);
+            if self.mesh.len() == first {
+                continue;
+            }
+            let id = model.mesh.material_id;
+            let index = match index_of.get(&id) {
+                Some(index) => *index,
+                None => {
+                    let material = self.material(id.map(|i| &declared[i]), file, path)?;
+                    self.mesh.materials.push(material);
+                    let index = self.mesh.materials.len() as u32 - 1;
+                    index_of.insert(id, index);
+                    index
+                }
+            };
+            self.mesh.material_of.resize(self.mesh.len(), index);
+        }
+        self.warnings.extend(told.warnings(name));
+        Ok(())
+    }
+
+    /// The material that `declared` and its patch make; without `declared`, the default grey.
+    fn material(&mut self, declared: Option<&MtlMaterial>, file: u32, obj_path: &Path) -> Result<Material> {
+        let Some(mtl) = declared else {
+            let name = String::new();
+            return Ok(Material {
+                name,
+                file,
+                albedo: Vec3::splat(DEFAULT_ALBEDO),
+                texture: None,
+                emission: Vec3::ZERO,
+                is_emitter: false,
+            });
+        };
+        let config = self.config;
+        let patch = config.materials.iter().find(|patch| patch.name == mtl.name);
+        let albedo = patch.and_then(|p| p.albedo_col).unwrap_or_else(|| own_albedo(mtl, &mut self.warnings));
+        let strength = strength(mtl, patch);
+        let emission = albedo * strength;
+        if strength > 0.0 && albedo == Vec3::ZERO {
+            let what = "expected a colour for what emits (Kd, else Ks, or albedo_col of a patch)";
+            return Err(Error::input(&mtl.place, format!("{what}, found black in material {:?}", mtl.name)));
+        }
+        if !emission.is_finite() {
+            let what = format!("expected an emission below 3.4e38, found albedo {albedo} times strength {strength}");
+            return Err(Error::input(&mtl.place, format!("{what} in material {:?}", mtl.name)));
+        }
+        self.note_simplification(mtl, patch, strength > 0.0);
+        let texture = match &mtl.map_kd {
+            Some((place, name)) => Some(self.texture(&beside(obj_path, name), name, place)?),
+            None => None,
+        };
+        if texture.is_some() && albedo == Vec3::ZERO {
+            self.warnings
+                .push(format!("{}: the texture of {:?} does not show: it multiplies black", mtl.place, mtl.name));
+        }
+        if texture.is_some() && strength > 0.0 {
+            self.warnings.push(format!("{}: the texture of {:?} does not change what it emits", mtl.place, mtl.name));
+        }
+        Ok(Material { name: mtl.name.clone(), file, albedo, texture, emission, is_emitter: emission != Vec3::ZERO })
+    }
+
+    /// Says so where a type other than diffuse is asked for.
+    fn note_simplification(&mut self, mtl: &MtlMaterial, patch: Option<&MaterialPatch>, emits: bool) {
+        let wanted = match (patch.and_then(|p| p.kind.as_deref()), mtl.illum) {
+            (Some(kind), _) if is_diffuse(kind) || (emits && says_emitter(kind)) => return,
+            (Some(kind), _) => format!("type {kind:?}"),
+            (None, Some(illum)) if illum >= 3 => format!("illum {illum}"),
+            (None, _) => return,
+        };
+        self.warnings.push(format!("{}: {:?} ({wanted}) is rendered as diffuse", mtl.place, mtl.name));
+    }
+
+    /// The index of the texture at `path`, loaded at its first use.
+    fn texture(&mut self, path: &Path, name: &str, place: &str) -> Result<u32> {
+        if let Some(&index) = self.textures.get(path) {
+            return Ok(index);
+        }
+        let bytes = self.inputs.read(path, name, &format!("the texture {name:?} (PNG or JPEG)"), place)?;
+        let texture = decode_texture(&bytes).map_err(|found| {
+            Error::input(place, format!("expected a PNG or JPEG image in {name:?}, found: {found}"))
+        })?;
+        let index = self.mesh.textures.len() as u32;
+        self.mesh.textures.push(texture);
+        self.textures.insert(path.to_owned(), index);
+        Ok(index)
+    }
+
+    fn warn_of_unmatched_patches(&mut self) {
+        for (i, patch) in self.config.materials.iter().enumerate() {
+            if !self.known.contains(&patch.name) {
+                let near = suggestion(&patch.name, self.known.iter().map(String::as_str));
+                self.warnings.push(format!("scene.materials[{i}].name: no material is called {:?}{near}", patch.name));
+            }
+        }
+    }
+}
+
+/// Opens the libraries of one `mtllib` line: one name that may hold blanks or, where no such file exists, several.
+fn open_libraries(
+    rest: &str,
+    place: &str,
+    obj_path: &Path,
+    inputs: &mut Inputs,
+    warnings: &mut Vec<String>,
+    opened: &mut Vec<PathBuf>,
+) -> Result<Vec<MtlMaterial>> {
+    let names: Vec<&str> = match beside(obj_path, rest).is_file() {
+        true => vec![rest],
+        false => rest.split_whitespace().collect(),
+    };
+    let mut materials = Vec::new();
+    for name in names {
+        let path = beside(obj_path, name);
+        let bytes = inputs.read(&path, name, &format!("the material library {name:?}"), place)?;
+        let (found, said) = obj::read_mtl(&bytes, name)?;
+        if !opened.contains(&path) {
+            warnings.extend(said);
+            materials.extend(found);
+            opened.push(path);
+        }
+    }
+    Ok(materials)
+}
+
+/// Hands the checked text to tobj. Polygons stay whole: tobj would cut them into fans, which is wrong where they are concave.
+fn read_geometry(checked: &CheckedObj, name: &str) -> Result<Vec<tobj::Model>> {
+    let mut text = b"mtllib declared\n".to_vec();
+    text.extend_from_slice(&checked.text);
+    let options = tobj::LoadOptions { single_index: true, ..tobj::LoadOptions::default() };
+    let declared = |_: &Path| {
+        let names = (0..checked.materials.len()).map(obj::tobj_name);
+        let materials = names.clone().map(|name| tobj::Material { name, ..Default::default() }).collect();
+        Ok((materials, names.enumerate().map(|(i, name)| (name, i)).collect()))
+    };
+    let (models, _) = tobj::load_obj_buf(&mut text.as_slice(), &options, declared)
+        .map_err(|e| Error::input(name, format!("expected a mesh that tobj reads, found: {e}")))?;
+    Ok(models)
+}
+
+/// Things that are counted and told once a file.
+#[derive(Default)]
+struct Told {
+    degenerate: usize,
+    zero_normals: usize,
+    concave: usize,
+}
+
+impl Told {
+    fn warnings(&self, name: &str) -> impl Iterator<Item = String> + use<> {
+        let lines = [
+            (self.degenerate, "triangles without area left out"),
+            (self.zero_normals, "normals of length 0 replaced by the face's own"),
+            (self.concave, "polygons that are not convex: cut into a fan, which may overlap itself"),
+        ];
+        let name = name.to_owned();
+        lines.into_iter().filter(|(n, _)| *n > 0).map(move |(n, what)| format!("{name}: {n} {what}"))
+    }
+}
+
+/// Cuts the polygons of one model into triangles and appends them.
+fn append_faces(from: &tobj::Mesh, to: &mut Mesh, told: &mut Told) {
+    let corner = |i: u32| Vec3::from_slice(&from.positions[3 * i as usize..]);
+    let uv = |i: u32| {
+        if from.texcoords.is_empty() { Vec2::ZERO } else { Vec2::from_slice(&from.texcoords[2 * i as usize..]) }
+    };
+    let mut left = from.indices.as_slice();
+    let mut arities = from.face_arities.iter();
+    while !left.is_empty() {
+        // No arities means triangles throughout.
+        let (face, rest) = left.split_at(arities.next().map_or(3, |&n| n as usize));
+        left = rest;
+        let start = fan_start(face, corner, told);
+        let at = |k: usize| face[(start + k) % face.len()];
+        for k in 1..face.len() - 1 {
+            let triangle = [at(0), at(k), at(k + 1)];
+            let positions = triangle.map(corner);
+            let Some(winding) = winding_normal(positions) else {
+                told.degenerate += 1;
+                continue;
+            };
+            to.positions.push(positions);
+            to.uvs.push(triangle.map(uv));
+            to.normals.push(triangle.map(|i| match from.normals.is_empty() {
+                true => winding,
+                false => unit(Vec3::from_slice(&from.normals[3 * i as usize..]).as_dvec3()).unwrap_or_else(|| {
+                    told.zero_normals += 1;
+                    winding
+                }),
+            }));
+        }
+    }
+}
+
+/// The corner whose fan covers the polygon without overlap: the first, unless the polygon is concave and another one does.
+fn fan_start(face: &[u32], corner: impl Fn(u32) -> Vec3, told: &mut Told) -> usize {
+    if face.len() == 3 {
+        return 0;
+    }
+    let points: Vec<DVec3> = face.iter().map(|&i| corner(i).as_dvec3()).collect();
+    let n = points.len();
+    let cross = |a: usize, b: usize, c: usize| (points[b % n] - points[a % n]).cross(points[c % n] - points[a % n]);
+    // Newell's normal: twice the polygon's area, whatever its shape.
+    let area: DVec3 = (1..n - 1).map(|k| cross(0, k, k + 1)).sum();
+    // The fan of a star-shaped corner has no triangle that turns the other way.
+    let rounding = -1e-9 * area.length_squared();
+    let covers = |s: usize| (1..n - 1).all(|k| cross(s, s + k, s + k + 1).dot(area) >= rounding);
+    // Looking at every corner of a huge polygon would take the square of its size.
+    let tried = if n <= 64 { n } else { 1 };
+    (0..tried).find(|&s| covers(s)).unwrap_or_else(|| {
+        told.concave += 1;
+        0
+    })
+}
+
+/// The unit vector along `v`; `None` where it is too short to have a direction in `f32`.
+fn unit(v: DVec3) -> Option<Vec3> {
+    let length = v.length();
+    (length as f32 > 0.0).then(|| (v / length).as_vec3())
+}
+
+/// Unit normal by the right-hand rule; `None` where the area is 0.
+fn winding_normal([a, b, c]: [Vec3; 3]) -> Option<Vec3> {
+    let [a, b, c] = [a, b, c].map(Vec3::as_dvec3);
+    unit((b - a).cross(c - a))
+}
+
+/// Kd; where it is black, Ks; where neither is given, white under a texture and else the default grey.
+fn own_albedo(mtl: &MtlMaterial, warnings: &mut Vec<String>) -> Vec3 {
+    let [kd, ks] = [mtl.kd, mtl.ks].map(|colour| colour.map(Vec3::from_array));
+    let bright = |colour: Option<Vec3>| colour.filter(|c| *c != Vec3::ZERO);
+    let albedo = match (bright(kd), bright(ks), kd) {
+        (Some(kd), _, _) => kd,
+        (None, None, None) if mtl.map_kd.is_some() => Vec3::ONE,
+        (None, Some(ks), _) => ks,
+        (None, None, Some(black)) => black,
+        (None, None, None) => {
+            warnings.push(format!("{}: {:?} has no colour (Kd, Ks): grey {DEFAULT_ALBEDO}", mtl.place, mtl.name));
+            Vec3::splat(DEFAULT_ALBEDO)
+        }
+    };
+    if albedo.max_element() > 1.0 {
+        warnings
+            .push(format!("{}: {:?} has an albedo above 1: it reflects more than it receives", mtl.place, mtl.name));
+    }
+    albedo
+}
+
+/// Emissive strength: the patch's, else luma(Ke) (Rec. 709), else [`DEFAULT_STRENGTH`] where name or type says emitter.
+fn strength(mtl: &MtlMaterial, patch: Option<&MaterialPatch>) -> f32 {
+    if let Some(given) = patch.and_then(|p| p.emissive_strength) {
+        return given;
+    }
+    let [r, g, b] = mtl.ke.unwrap_or_default().map(f64::from);
+    let luma = (0.2126 * r + 0.7152 * g + 0.0722 * b) as f32;
+    let says = says_emitter(&mtl.name) || patch.and_then(|p| p.kind.as_deref()).is_some_and(says_emitter);
+    if luma > 0.0 || !says { luma } else { DEFAULT_STRENGTH }
+}
+
+/// Whether a name or type means an emitter.
+fn says_emitter(word: &str) -> bool {
+    let word = word.to_ascii_lowercase();
+    word.contains("light") || word.contains("emissive")
+}
+
+/// Whether a type means what is rendered anyway.
+fn is_diffuse(kind: &str) -> bool {
+    let kind = kind.to_ascii_lowercase();
+    kind.contains("diffuse") || kind.contains("lambert")
+}
+
+/// One line for each emitter: file, name, radiance, number of triangles.
+fn emitter_list(mesh: &Mesh, config: &SceneConfig) -> Vec<String> {
+    let mut triangles = vec![0usize; mesh.materials.len()];
+    for &material in &mesh.material_of {
+        triangles[material as usize] += 1;
+    }
+    let emitters = mesh.materials.iter().zip(triangles).filter(|(material, _)| material.is_emitter);
+    emitters
+        .map(|(material, n)| {
+            let file = &config.mesh_files[material.file as usize];
+            let [r, g, b] = material.emission.to_array();
+            format!("{file}: {:?} emits radiance [{r}, {g}, {b}] from {n} triangles", material.name)
+        })
+        .collect()
+}
+
+/// PNG or JPEG bytes → linear texels; an alpha channel is not used.
+fn decode_texture(bytes: &[u8]) -> std::result::Result<Texture, String> {
+    let open = || image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string());
+    let (width, height) = open()?.into_dimensions().map_err(|e| e.to_string())?;
+    if u64::from(width) * u64::from(height) > MAX_TEXELS || width == 0 || height == 0 {
+        return Err(format!("{width} times {height} pixels (1 to {MAX_TEXELS} are possible)"));
+    }
+    let mut reader = open()?;
+    // The size is checked above; the crate's own limit on memory is lower than ours.
+    reader.no_limits();
+    let decoded = reader.decode().map_err(|e| e.to_string())?;
+    let texels = match decoded.color().bytes_per_pixel() / decoded.color().channel_count() {
+        1 => {
+            let linear: Vec<f32> = (0..=255u8).map(|v| srgb_decode(f32::from(v) / 255.0)).collect();
+            decoded.to_rgb8().pixels().map(|p| p.0.map(|v| linear[usize::from(v)])).collect()
+        }
+        _ => decoded.to_rgb16().pixels().map(|p| p.0.map(|v| srgb_decode(f32::from(v) / 65535.0))).collect(),
+    };
+    Ok(Texture { width, height, texels })
+}
