@@ -1,0 +1,254 @@
+//! What a runner needs of the rest of the lab: scenes, samplers, pictures and point sets, behind one trait.
+//!
+//! Planning and executing are written against [`Backend`] alone, so they are tested with a small made-up one; the
+//! lab's own is [`Lab`](super::lab::Lab).
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::Result;
+use crate::film::Image;
+
+/// Width and height of an image in pixels, written `WxH`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Size {
+    /// Columns, at least 1.
+    pub width: u32,
+    /// Rows, at least 1.
+    pub height: u32,
+}
+
+impl Size {
+    /// The largest number of pixels that an image of an experiment may have.
+    pub const MOST_PIXELS: u64 = 1 << 26;
+
+    /// Reads `WxH`.
+    ///
+    /// # Errors
+    /// What was expected, as a text without a place: both numbers at least 1, no more than
+    /// [`MOST_PIXELS`](Self::MOST_PIXELS) together.
+    pub fn parse(text: &str) -> std::result::Result<Self, String> {
+        let expected = || {
+            format!(
+                "expected a size such as \"320x180\", both at least 1 and {} pixels at most together, found {text:?}",
+                Self::MOST_PIXELS
+            )
+        };
+        // `parse::<u32>` alone would also take "+3".
+        let number = |digits: &str| -> Option<u32> {
+            digits.bytes().all(|b| b.is_ascii_digit()).then(|| digits.parse().ok()).flatten()
+        };
+        let (width, height) = text.split_once('x').ok_or_else(expected)?;
+        let size = Self { width: number(width).ok_or_else(expected)?, height: number(height).ok_or_else(expected)? };
+        if size.pixels() == 0 || size.pixels() > Self::MOST_PIXELS { Err(expected()) } else { Ok(size) }
+    }
+
+    /// Number of pixels.
+    pub fn pixels(self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+}
+
+impl fmt::Display for Size {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}x{}", self.width, self.height)
+    }
+}
+
+impl TryFrom<String> for Size {
+    type Error = String;
+    fn try_from(text: String) -> std::result::Result<Self, String> {
+        Self::parse(&text)
+    }
+}
+
+impl From<Size> for String {
+    fn from(size: Size) -> Self {
+        size.to_string()
+    }
+}
+
+/// How one light of several is weighted (SPEC §3).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Estimator {
+    /// Divides by the probability of the choice.
+    Unbiased,
+    /// The sheet's shortcut: leaves the division out.
+    Sheet,
+}
+
+impl Estimator {
+    /// The name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Unbiased => "unbiased",
+            Self::Sheet => "sheet",
+        }
+    }
+}
+
+/// The four pictures of the sheet's Figure 1, each with one decision more than the one before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Stage {
+    /// Pixel centres and albedo: nothing is sampled.
+    Start,
+    /// And a sampled pixel.
+    Aa,
+    /// And a sampled lens.
+    Dof,
+    /// And a sampled area light: the full picture.
+    Final,
+}
+
+impl Stage {
+    /// All four, in the order of the sheet.
+    pub const ALL: [Self; 4] = [Self::Start, Self::Aa, Self::Dof, Self::Final];
+
+    /// The name in files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Start => "start",
+            Self::Aa => "aa",
+            Self::Dof => "dof",
+            Self::Final => "final",
+        }
+    }
+}
+
+/// What a plan needs to know of a scene.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SceneFacts {
+    /// Short name: the config file's, without folder and ending.
+    pub name: String,
+    /// Hex digest of everything the scene was read from.
+    pub content_hash: String,
+    /// Image size that the scene file asks for.
+    pub size: Size,
+    /// Samples per pixel that the scene file asks for.
+    pub spp: u32,
+    /// The decisions of the scene and their dimensions, in words.
+    pub layout: String,
+    /// Whether every pixel's value is known in closed form, so that the reference is exact.
+    pub exact_reference: bool,
+    /// Whether there is a lens to sample.
+    pub lens: bool,
+    /// Bytes held while the scene is open.
+    pub memory_bytes: u64,
+}
+
+/// Numbers that stand for the code behind an item: each is raised when, and only when, that code's bits change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Algorithms {
+    /// Rays, shading, film.
+    pub renderer: u32,
+    /// The sampler asked about.
+    pub sampler: u32,
+    /// The light estimator.
+    pub estimator: u32,
+    /// The closed forms that serve as exact references.
+    pub exact: u32,
+    /// Image errors and point-set metrics.
+    pub metrics: u32,
+}
+
+/// One image to render.
+#[derive(Debug, Clone, Copy)]
+pub struct RenderRequest<'a> {
+    /// Scene, by the name of its [`SceneFacts`].
+    pub scene: &'a str,
+    /// Sampler in canonical form, for every decision.
+    pub sampler: &'a str,
+    /// Samples per pixel asked for; the sampler takes [`Backend::taken`].
+    pub spp: u32,
+    /// The randomisation.
+    pub seed: u64,
+    /// Image size.
+    pub size: Size,
+    /// Light estimator.
+    pub estimator: Estimator,
+    /// How much of the picture is sampled.
+    pub stage: Stage,
+    /// Threads to use; no bit depends on it.
+    pub threads: usize,
+}
+
+/// Values of point-set metrics by name; `None` where a metric is not defined for the set.
+pub type PointMetrics = BTreeMap<String, Option<f64>>;
+
+/// Scenes, samplers, pictures and point sets.
+///
+/// Each answer is a pure function of the arguments and of the files opened: same call, same bits.
+pub trait Backend {
+    /// Reads the scene called `scene` (a bare name or the path of a config file) and keeps it open under the name in
+    /// the answer.
+    ///
+    /// # Errors
+    /// Kind `Input` where the scene cannot be read.
+    fn open_scene(&self, scene: &str) -> Result<SceneFacts>;
+
+    /// The canonical form of a sampler's text: texts that mean the same sampler have the same one, and it is a text
+    /// for the same sampler itself. A bare name means its `:best` preset.
+    ///
+    /// # Errors
+    /// Kind `Input` with the legal combinations.
+    fn parse_sampler(&self, text: &str) -> Result<String>;
+
+    /// Whether another seed gives another image of the scene, or another point set where no scene is given. Without
+    /// that there is nothing to replicate. It is a question about both: a sampler may draw for some decisions only.
+    fn is_random(&self, canonical: &str, scene: Option<&str>) -> bool;
+
+    /// The number of samples that the sampler takes for the scene (or of points, where none is given) where `asked`
+    /// are asked for; at least `asked`.
+    fn taken(&self, canonical: &str, scene: Option<&str>, asked: u32) -> u32;
+
+    /// The algorithm numbers behind items of this sampler.
+    fn algorithms(&self, canonical: &str) -> Algorithms;
+
+    /// Does what rendering needs once and should not be timed with it: compiles the scene, starts the threads.
+    ///
+    /// # Errors
+    /// Kind `Input` where the scene cannot be compiled.
+    fn prepare(&self, request: &RenderRequest) -> Result<()>;
+
+    /// Renders one image. Every pixel is finite.
+    ///
+    /// # Errors
+    /// Kind `Incomplete` where a sample is not finite, naming its pixel and sample index.
+    fn render(&self, request: &RenderRequest) -> Result<Image>;
+
+    /// The exact image of a scene whose facts say that there is one.
+    ///
+    /// # Errors
+    /// Kind `Incomplete` where the quadrature does not reach its tolerance.
+    fn exact_reference(&self, scene: &str, size: Size) -> Result<Image>;
+
+    /// The names that [`point_metrics`](Self::point_metrics) knows.
+    fn point_metric_names(&self) -> &'static [&'static str];
+
+    /// Metrics of the set of `taken(n)` points that the sampler gives one decision in one pixel.
+    ///
+    /// # Errors
+    /// Kind `Input` where the sampler has no points.
+    fn point_metrics(&self, canonical: &str, n: u32, seed: u64, metrics: &[String]) -> Result<PointMetrics>;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_size_reads_back_as_written_and_strange_ones_are_refused() {
+        assert_eq!(Size::parse("80x45"), Ok(Size { width: 80, height: 45 }));
+        assert_eq!(Size::parse("80x45").unwrap().to_string(), "80x45");
+        for bad in
+            ["", "80", "80x", "x45", "0x45", "80x0", "-8x45", "+8x45", "8 x45", "80X45", "80x45x3", "99999x99999"]
+        {
+            assert!(Size::parse(bad).unwrap_err().contains("expected a size"), "{bad}");
+        }
+    }
+}

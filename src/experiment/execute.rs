@@ -1,0 +1,559 @@
+//! Does what a plan still lacks. The only slow stage, and one that may be stopped at any moment.
+//!
+//! Items run one at a time in plan order, threads work inside an image. A finished item is one line appended to
+//! `results.jsonl`; a finished image is on disk before its row is. When the last item is done the rows are written
+//! once more, in plan order and in one piece, so the bytes do not depend on how often the run was interrupted.
+
+use std::collections::{HashMap, HashSet};
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use super::backend::{Backend, RenderRequest, Size};
+use super::identity::pixel_hash;
+use super::images::Images;
+use super::machine;
+use super::measure::{self, ReferenceImages};
+use super::plan::{EnsembleWork, ImageWork, Plan, PointsWork, ReferenceSource, ReferenceWork, Work, WorkItem};
+use super::progress::{Meter, Progress};
+use super::results::{
+    self, About, EnsembleRow, ImageErrors, ImageRow, Kind, PointsRow, ReferenceRow, Row, SCHEMA, Timing,
+};
+use super::survey::{Limits, Standing, State, Survey};
+use crate::error::{Error, ErrorKind, Result};
+use crate::film::Image;
+
+/// How to run.
+pub struct Options<'a> {
+    /// Threads that work inside an image, at least 1.
+    pub threads: usize,
+    /// Forget what the folder holds and do everything again.
+    pub fresh: bool,
+    /// The command that makes this folder, for provenance; the same for every run of the same experiment.
+    pub command: String,
+    /// What the run may use.
+    pub limits: Limits,
+    /// End after so many items, as a kill would.
+    pub at_most: Option<usize>,
+    /// Set from elsewhere: end after the item at hand.
+    pub stop: Option<&'a AtomicBool>,
+}
+
+impl Options<'_> {
+    /// Options of a plain run.
+    pub fn new(threads: usize, command: impl Into<String>) -> Self {
+        let (limits, command) = (Limits::default(), command.into());
+        Self { threads: threads.max(1), fresh: false, command, limits, at_most: None, stop: None }
+    }
+}
+
+/// An item that could not be done.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Failure {
+    /// The item.
+    pub id: String,
+    /// The item in words.
+    pub label: String,
+    /// Why.
+    pub error: Error,
+}
+
+/// What a run did.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// Items of the plan.
+    pub items: usize,
+    /// Items that were done before.
+    pub found: usize,
+    /// Items that this run did.
+    pub done: usize,
+    /// Items that could not be done; the others went on.
+    pub failures: Vec<Failure>,
+    /// Whether the run was told to end early.
+    pub interrupted: bool,
+    /// Samples rendered.
+    pub samples: u64,
+}
+
+impl Outcome {
+    /// Nothing is missing.
+    ///
+    /// # Errors
+    /// Kind `Incomplete` that counts what is missing and gives the first reason.
+    pub fn check(&self) -> Result<()> {
+        let missing = self.items - self.found - self.done;
+        match self.failures.first() {
+            None if missing == 0 => Ok(()),
+            None => Err(Error::incomplete("run", format!("expected {} items, {missing} are missing", self.items))),
+            Some(Failure { label, error, .. }) => {
+                let what =
+                    format!("expected {} items, {} failed, first {label}: {error}", self.items, self.failures.len());
+                Err(Error::incomplete("run", what))
+            }
+        }
+    }
+}
+
+/// Does every item of `plan` that `out` lacks.
+///
+/// # Errors
+/// Kind `Input` where the folder's rows do not read, another run writes there, or the plan needs more than the limits;
+/// kind `Write` where something cannot be written. An item that fails is no error but a [`Failure`] in the outcome.
+pub fn execute(
+    plan: &Plan,
+    backend: &dyn Backend,
+    out: &Path,
+    progress: &dyn Progress,
+    options: &Options,
+) -> Result<Outcome> {
+    let _lock = lock(out)?;
+    if options.fresh {
+        forget(out)?;
+    }
+    let standing = Standing::read(plan, out)?;
+    let survey = Survey::new(plan, &standing, out, options.threads);
+    survey.refuse_above(&options.limits, &plan.experiment.place)?;
+    write_about(plan, out, &options.command)?;
+    let found = standing.states.iter().filter(|&&state| state == State::Done).count();
+    let meter = Meter::new(found, plan.items.len(), survey.samples_left);
+    let mut run = Run::new(plan, backend, out, progress, options, standing, meter)?;
+    let (done, interrupted) = run.all_items()?;
+    if !interrupted {
+        run.write_in_plan_order()?;
+    }
+    let samples = run.meter.tick().samples_done;
+    Ok(Outcome { items: plan.items.len(), found, done, failures: run.failures, interrupted, samples })
+}
+
+/// Two runs that append to the same files would tear each other's lines. The system lets go of the lock with the process.
+fn lock(out: &Path) -> Result<File> {
+    let path = out.join("images").join(".lock");
+    let fail = |e: std::io::Error| Error::write(&path, format!("cannot write: {e}"));
+    std::fs::create_dir_all(out.join("images")).map_err(fail)?;
+    let file = File::create(&path).map_err(fail)?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(std::fs::TryLockError::WouldBlock) => {
+            Err(Error::input(out.display(), "expected no other run in this folder, found one at work"))
+        }
+        Err(std::fs::TryLockError::Error(e)) => Err(fail(e)),
+    }
+}
+
+/// Removes the rows, timings and images of earlier runs, and nothing else.
+fn forget(out: &Path) -> Result<()> {
+    let fail = |path: &Path, e: std::io::Error| Error::write(path, format!("cannot remove: {e}"));
+    let mut paths = vec![results::results_path(out), results::timings_path(out)];
+    let images = out.join("images");
+    for entry in std::fs::read_dir(&images).map_err(|e| fail(&images, e))? {
+        let path = entry.map_err(|e| fail(&images, e))?.path();
+        if path.extension().is_some_and(|ending| ending == "exr") {
+            paths.push(path);
+        }
+    }
+    for path in paths.iter().filter(|path| path.exists()) {
+        std::fs::remove_file(path).map_err(|e| fail(path, e))?;
+    }
+    Ok(())
+}
+
+/// Writes down what is run here.
+fn write_about(plan: &Plan, out: &Path, command: &str) -> Result<()> {
+    let about = About {
+        schema: SCHEMA,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        command: command.to_owned(),
+        experiment: plan.experiment.clone(),
+        scenes: plan.scenes.clone(),
+        notes: plan.notes.clone(),
+    };
+    let path = results::about_path(out);
+    let mut text = serde_json::to_string_pretty(&about).map_err(|e| Error::write(&path, e))?;
+    text.push('\n');
+    results::write_if_changed(&path, text.as_bytes())
+}
+
+/// A file to which whole lines are appended.
+struct Log {
+    path: PathBuf,
+    file: File,
+}
+
+impl Log {
+    fn open(path: PathBuf) -> Result<Self> {
+        match OpenOptions::new().append(true).create(true).open(&path) {
+            Ok(file) => Ok(Self { path, file }),
+            Err(e) => Err(Error::write(&path, format!("cannot open: {e}"))),
+        }
+    }
+
+    /// One call to the system for the whole line: a kill leaves all of it or a part without an end.
+    fn append(&mut self, mut line: String) -> Result<()> {
+        line.push('\n');
+        let written = self.file.write_all(line.as_bytes()).and_then(|()| self.file.flush());
+        written.map_err(|e| Error::write(&self.path, format!("cannot append: {e}")))
+    }
+}
+
+/// A run at work.
+struct Run<'a> {
+    plan: &'a Plan,
+    backend: &'a dyn Backend,
+    out: &'a Path,
+    progress: &'a dyn Progress,
+    options: &'a Options<'a>,
+    host: String,
+    images: Images,
+    /// The reference at hand: items of one reference stand together.
+    reference: Option<(String, Arc<ReferenceImages>)>,
+    rows: HashMap<String, Row>,
+    timings: HashMap<String, Timing>,
+    states: Vec<State>,
+    /// Images that could not be made, by id: whatever needs one fails for the same reason.
+    failed_images: HashMap<String, Error>,
+    failures: Vec<Failure>,
+    results_log: Log,
+    timings_log: Log,
+    meter: Meter,
+}
+
+impl<'a> Run<'a> {
+    /// Opens the logs, after cutting off what a kill left torn.
+    fn new(
+        plan: &'a Plan,
+        backend: &'a dyn Backend,
+        out: &'a Path,
+        progress: &'a dyn Progress,
+        options: &'a Options<'a>,
+        standing: Standing,
+        meter: Meter,
+    ) -> Result<Self> {
+        let Standing { rows, in_file, timings, states, is_clean } = standing;
+        let (results_path, timings_path) = (results::results_path(out), results::timings_path(out));
+        if !is_clean {
+            results::write_lines(&results_path, in_file.iter())?;
+            results::write_lines(&timings_path, sorted(&timings).into_iter())?;
+        }
+        Ok(Self {
+            plan,
+            backend,
+            out,
+            progress,
+            options,
+            host: machine::describe(),
+            images: Images::new(out),
+            reference: None,
+            rows,
+            timings,
+            states,
+            failed_images: HashMap::new(),
+            failures: Vec::new(),
+            results_log: Log::open(results_path)?,
+            timings_log: Log::open(timings_path)?,
+            meter,
+        })
+    }
+
+    /// Goes through the plan; how many items were done, and whether it ended early.
+    fn all_items(&mut self) -> Result<(usize, bool)> {
+        let released = self.plan.released_after();
+        let mut done = 0;
+        for (position, released) in released.iter().enumerate() {
+            if self.states[position] != State::Done {
+                let told = self.options.stop.is_some_and(|stop| stop.load(Ordering::Relaxed));
+                if told || self.options.at_most == Some(done) {
+                    return Ok((done, true));
+                }
+                done += usize::from(self.one_item(position)?);
+            }
+            self.images.release(released);
+        }
+        Ok((done, false))
+    }
+
+    /// Does one item; whether it could be done.
+    fn one_item(&mut self, position: usize) -> Result<bool> {
+        let plan = self.plan;
+        let item = &plan.items[position];
+        self.progress.item_started(&item.label(), &self.meter.tick());
+        let result = match self.states[position] {
+            // The row is right already: only its image is wanted.
+            State::ImageMissing => self.image(&item.id).map(|_| ()),
+            _ => self.row_of(item).and_then(|row| self.record(row)),
+        };
+        let is_done = match result {
+            Ok(()) => {
+                self.meter.add_item();
+                true
+            }
+            Err(error) if error.kind == ErrorKind::Write => return Err(error),
+            Err(error) => {
+                self.progress.warn(&format!("{}: {error}", item.label()));
+                self.failures.push(Failure { id: item.id.clone(), label: item.label(), error });
+                false
+            }
+        };
+        self.progress.item_ended(&self.meter.tick());
+        Ok(is_done)
+    }
+
+    /// Appends a row.
+    fn record(&mut self, row: Row) -> Result<()> {
+        self.results_log.append(row.to_line())?;
+        self.rows.insert(row.id().to_owned(), row);
+        Ok(())
+    }
+
+    /// What an item finds.
+    fn row_of(&mut self, item: &WorkItem) -> Result<Row> {
+        match &item.work {
+            Work::Image(work) => self.image_row(item, work).map(Row::Image),
+            Work::Reference(work) => self.reference_row(item, work).map(Row::Reference),
+            Work::Ensemble(work) => self.ensemble_row(item, work).map(Row::Ensemble),
+            Work::Points(work) => self.points_row(item, work).map(Row::Points),
+        }
+    }
+
+    fn names(&self, sampler: &str) -> Vec<String> {
+        self.plan.names(sampler).to_vec()
+    }
+
+    fn image_row(&mut self, item: &WorkItem, work: &ImageWork) -> Result<ImageRow> {
+        let image = self.image(&item.id)?;
+        let errors: Option<ImageErrors> = match &work.reference_id {
+            None => None,
+            Some(id) => Some(measure::errors(&image, &*self.reference(id)?, id, item.metrics_algorithm)),
+        };
+        Ok(ImageRow {
+            schema: SCHEMA,
+            id: item.id.clone(),
+            kind: work.kind,
+            scene: work.scene.clone(),
+            sampler: work.sampler.clone(),
+            names: self.names(&work.sampler),
+            spp: work.spp,
+            replicate: work.replicate,
+            seed: work.seed,
+            estimator: work.estimator,
+            stage: work.stage,
+            size: work.size,
+            mean: measure::mean_value(&image.pixels),
+            pixels: pixel_hash(&image.pixels),
+            errors,
+        })
+    }
+
+    fn reference_row(&mut self, item: &WorkItem, work: &ReferenceWork) -> Result<ReferenceRow> {
+        let reference = self.reference(&item.id)?;
+        let (sampler, spp, halves) = match &work.source {
+            ReferenceSource::Exact => ("exact".to_owned(), None, None),
+            ReferenceSource::Halves { ids, sampler, spp } => (sampler.clone(), Some(*spp), Some(ids.clone())),
+        };
+        Ok(ReferenceRow {
+            schema: SCHEMA,
+            id: item.id.clone(),
+            kind: Kind::Reference,
+            scene: work.scene.clone(),
+            sampler,
+            spp,
+            size: work.size,
+            halves,
+            metrics_algorithm: item.metrics_algorithm,
+            noise_mse: reference.noise_mse(),
+            mean: reference.mean_value(),
+            pixels: reference.pixels(),
+        })
+    }
+
+    fn ensemble_row(&mut self, item: &WorkItem, work: &EnsembleWork) -> Result<EnsembleRow> {
+        let members: Vec<Arc<Image>> = work.members.iter().map(|id| self.image(id)).collect::<Result<_>>()?;
+        let reference = self.reference(&work.reference_id)?;
+        let (e, error_autocorrelation) = measure::ensemble(&members, &reference);
+        Ok(EnsembleRow {
+            schema: SCHEMA,
+            id: item.id.clone(),
+            kind: Kind::Ensemble,
+            scene: work.scene.clone(),
+            sampler: work.sampler.clone(),
+            names: self.names(&work.sampler),
+            spp: work.spp,
+            estimator: work.estimator,
+            size: work.size,
+            reference_id: work.reference_id.clone(),
+            metrics_algorithm: item.metrics_algorithm,
+            replicates: members.len() as u32,
+            mse: e.mse,
+            rmse: e.rmse,
+            rel_mse: e.rel_mse,
+            bias2: e.bias2,
+            variance: e.variance,
+            bias: e.bias,
+            error_autocorrelation,
+            members: work.members.clone(),
+        })
+    }
+
+    fn points_row(&mut self, item: &WorkItem, work: &PointsWork) -> Result<PointsRow> {
+        let metrics = self.backend.point_metrics(&work.sampler, work.n.asked, work.seed, &work.metrics)?;
+        Ok(PointsRow {
+            schema: SCHEMA,
+            id: item.id.clone(),
+            kind: Kind::Points,
+            sampler: work.sampler.clone(),
+            names: self.names(&work.sampler),
+            n: work.n,
+            replicate: work.replicate,
+            seed: work.seed,
+            metrics_algorithm: item.metrics_algorithm,
+            metrics,
+        })
+    }
+
+    /// The images of a reference.
+    fn reference(&mut self, id: &str) -> Result<Arc<ReferenceImages>> {
+        if let Some((held, images)) = &self.reference
+            && held == id
+        {
+            return Ok(images.clone());
+        }
+        let [a, b] = self.plan.reference_images(id);
+        let images = Arc::new(ReferenceImages::new([self.image(a)?, self.image(b)?]));
+        self.reference = Some((id.to_owned(), images.clone()));
+        Ok(images)
+    }
+
+    /// An image of the plan: held, else from disk, else made.
+    fn image(&mut self, id: &str) -> Result<Arc<Image>> {
+        if let Some(error) = self.failed_images.get(id) {
+            return Err(error.clone());
+        }
+        if let Some(image) = self.images.held(id) {
+            return Ok(image);
+        }
+        let plan = self.plan;
+        let item = &plan.items[plan.position(id).expect("plans are closed: what an item needs is an item")];
+        let size = item.kept_image().expect("only items with images are needed by others");
+        let pixels = self.rows.get(id).and_then(Row::kept_pixels).map(str::to_owned);
+        // An image without its timing was saved by a run that was killed in between, or carried here: it is right, but
+        // the report wants its seconds too.
+        let is_timed = self.timings.contains_key(id);
+        if is_timed && let Some(image) = self.images.load(id, size, pixels.as_deref()) {
+            return Ok(image);
+        }
+        let made = self.make(item, size, pixels.as_deref());
+        if let Err(error) = &made {
+            self.failed_images.insert(id.to_owned(), error.clone());
+        }
+        made
+    }
+
+    /// Makes an image, times it, and saves it; `pixels` is what a row says of it.
+    fn make(&mut self, item: &WorkItem, size: Size, pixels: Option<&str>) -> Result<Arc<Image>> {
+        let request = self.request(item);
+        if let Some(request) = &request {
+            self.backend.prepare(request)?;
+        }
+        let load = machine::load();
+        let started = Instant::now();
+        let image = self.pixels_of(item, request.as_ref(), size)?;
+        let seconds = started.elapsed().as_secs_f64();
+        measure::check_finite(&image, &item.label())?;
+        let found = pixel_hash(&image.pixels);
+        if let Some(expected) = pixels
+            && expected != found
+        {
+            let what = format!(
+                "expected the pixels of its row, {expected}, found {found}: code changed its bits and kept its algorithm number; `--fresh` does everything again"
+            );
+            return Err(Error::incomplete(item.label(), what));
+        }
+        let (samples, threads) = (item.samples(), self.options.threads);
+        if !self.timings.contains_key(&item.id) {
+            let (id, host) = (item.id.clone(), self.host.clone());
+            let timing = Timing { id, seconds, samples, host, threads, load };
+            self.timings_log.append(results::line(&timing))?;
+            self.timings.insert(item.id.clone(), timing);
+        }
+        self.meter.add_samples(samples);
+        let provenance = self.provenance(item);
+        self.images.save(&item.id, image, &provenance)
+    }
+
+    /// What to ask the backend for, where the image is rendered.
+    fn request<'w>(&self, item: &'w WorkItem) -> Option<RenderRequest<'w>> {
+        let Work::Image(work) = &item.work else { return None };
+        Some(RenderRequest {
+            scene: &work.scene,
+            sampler: &work.sampler,
+            spp: work.spp.asked,
+            seed: work.seed,
+            size: work.size,
+            estimator: work.estimator,
+            stage: work.stage,
+            threads: self.options.threads,
+        })
+    }
+
+    /// The bare pixels.
+    fn pixels_of(&self, item: &WorkItem, request: Option<&RenderRequest>, size: Size) -> Result<Image> {
+        let image = match (request, &item.work) {
+            (Some(request), _) => self.backend.render(request),
+            (None, Work::Reference(work)) => self.backend.exact_reference(&work.scene, size),
+            (None, _) => unreachable!("these keep no image"),
+        }?;
+        assert_eq!((image.width, image.height), (size.width, size.height), "an image of another size than asked for");
+        Ok(image)
+    }
+
+    /// What an image says of its making.
+    fn provenance(&self, item: &WorkItem) -> Vec<(String, String)> {
+        let experiment = &self.plan.experiment;
+        let mut fields = vec![
+            ("experiment", experiment.name.clone()),
+            ("experiment_seed", experiment.seed.to_string()),
+            ("version", env!("CARGO_PKG_VERSION").to_owned()),
+            ("command", self.options.command.clone()),
+            ("kind", results::kind_name(item.kind()).to_owned()),
+        ];
+        if let Work::Image(work) = &item.work {
+            fields.extend([
+                ("scene", work.scene.clone()),
+                ("sampler", work.sampler.clone()),
+                ("spp", work.spp.taken.to_string()),
+                ("seed", work.seed.to_string()),
+                ("estimator", work.estimator.name().to_owned()),
+                ("stage", work.stage.name().to_owned()),
+            ]);
+        }
+        fields.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+    }
+
+    /// The last step: rows and timings of this plan, in its order, each file in one piece.
+    fn write_in_plan_order(&mut self) -> Result<()> {
+        let failed: HashSet<&str> = self.failures.iter().map(|failure| failure.id.as_str()).collect();
+        let mut rows = Vec::new();
+        for (item, state) in self.plan.items.iter().zip(&self.states) {
+            // The row of a failed item, if it has one, was measured another way; where only the image is missing it holds.
+            let is_stale = failed.contains(item.id.as_str()) && *state == State::Missing;
+            if let Some(mut row) = self.rows.get(&item.id).filter(|_| !is_stale).cloned() {
+                if let Some(sampler) = item.sampler() {
+                    row.set_names(self.plan.names(sampler));
+                }
+                rows.push(row);
+            }
+        }
+        results::write_lines(&results::results_path(self.out), rows.iter())?;
+        let timings = self.plan.items.iter().filter_map(|item| self.timings.get(&item.id));
+        results::write_lines(&results::timings_path(self.out), timings)
+    }
+}
+
+/// Timings in an order of their own.
+fn sorted(timings: &HashMap<String, Timing>) -> Vec<&Timing> {
+    let mut sorted: Vec<&Timing> = timings.values().collect();
+    sorted.sort_by(|a, b| a.id.cmp(&b.id));
+    sorted
+}

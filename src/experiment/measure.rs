@@ -1,0 +1,153 @@
+//! From images to the numbers of a row.
+
+use std::sync::Arc;
+
+use crate::error::{Error, Result};
+use crate::film::Image;
+use crate::stats::{Ensemble, Estimate, image_error, sum, t_interval};
+
+use super::identity::pixel_hash;
+use super::results::ImageErrors;
+
+/// What images are compared with: two independent halves, or a closed form given twice.
+pub struct ReferenceImages {
+    halves: [Arc<Image>; 2],
+    /// Mean of the halves, rounded once to `f32`.
+    mean: Vec<[f32; 3]>,
+}
+
+impl ReferenceImages {
+    /// Two halves of one size.
+    pub fn new(halves: [Arc<Image>; 2]) -> Self {
+        let half_sum = |(a, b): (&f32, &f32)| ((f64::from(*a) + f64::from(*b)) / 2.0) as f32;
+        let [a, b] = &halves;
+        let mean = std::iter::zip(&a.pixels, &b.pixels)
+            .map(|(a, b)| [half_sum((&a[0], &b[0])), half_sum((&a[1], &b[1])), half_sum((&a[2], &b[2]))])
+            .collect();
+        Self { halves, mean }
+    }
+
+    /// Mean square error of the halves' mean: 0 for a closed form.
+    pub fn noise_mse(&self) -> f64 {
+        let [a, b] = self.flat();
+        image_error::reference_noise(a, b)
+    }
+
+    /// Mean over all pixel-channels.
+    pub fn mean_value(&self) -> f64 {
+        mean_value(&self.mean)
+    }
+
+    /// Digest of the mean of the halves.
+    pub fn pixels(&self) -> String {
+        pixel_hash(&self.mean)
+    }
+
+    fn flat(&self) -> [&[f32]; 2] {
+        self.halves.each_ref().map(|half| half.pixels.as_flattened())
+    }
+}
+
+/// Mean over all pixel-channels.
+pub fn mean_value(pixels: &[[f32; 3]]) -> f64 {
+    let channels = pixels.as_flattened();
+    sum(channels.iter().map(|&c| f64::from(c))) / channels.len() as f64
+}
+
+/// Errors of one image.
+pub fn errors(image: &Image, reference: &ReferenceImages, reference_id: &str, metrics_algorithm: u32) -> ImageErrors {
+    let t = image.pixels.as_flattened();
+    let r = reference.mean.as_flattened();
+    let [r1, r2] = reference.flat();
+    ImageErrors {
+        reference_id: reference_id.to_owned(),
+        metrics_algorithm,
+        mse: image_error::mse(t, r),
+        mse_unbiased: image_error::mse_unbiased(t, r1, r2),
+        rel_mse: image_error::rel_mse(t, r),
+        mae: image_error::mae(t, r),
+        bias: image_error::bias(t, r),
+        error_autocorrelation: autocorrelation(image, reference),
+    }
+}
+
+/// Errors of all replicates together, intervals rounded as they are written.
+pub fn ensemble(replicates: &[Arc<Image>], reference: &ReferenceImages) -> (Ensemble, Option<Estimate>) {
+    let images: Vec<&[[f32; 3]]> = replicates.iter().map(|image| image.pixels.as_slice()).collect();
+    let [r1, r2] = &reference.halves;
+    let e = image_error::ensemble(&images, &r1.pixels, &r2.pixels);
+    // A mean over some replicates only would be another quantity: one that is not defined leaves none.
+    let correlations: Option<Vec<f64>> = replicates.iter().map(|image| autocorrelation(image, reference)).collect();
+    let rounded = Ensemble {
+        mse: round_interval(e.mse),
+        rmse: e.rmse.map(round_interval),
+        rel_mse: round_interval(e.rel_mse),
+        bias2: round_interval(e.bias2),
+        variance: e.variance.map(round_interval),
+        bias: round_interval(e.bias),
+    };
+    (rounded, correlations.map(|values| round_interval(t_interval(&values, 0.95))))
+}
+
+/// Correlation of the error between neighbouring pixels.
+fn autocorrelation(image: &Image, reference: &ReferenceImages) -> Option<f64> {
+    let [r1, r2] = &reference.halves;
+    let (width, height) = (image.width as usize, image.height as usize);
+    image_error::error_autocorrelation(&image.pixels, &r1.pixels, &r2.pixels, width, height)
+}
+
+/// Every pixel of an image is a number.
+///
+/// # Errors
+/// Kind `Incomplete` that names the first pixel that is not, and its channels.
+pub fn check_finite(image: &Image, place: &str) -> Result<()> {
+    let Some(at) = image.pixels.iter().position(|pixel| pixel.iter().any(|c| !c.is_finite())) else { return Ok(()) };
+    let (x, y) = (at % image.width as usize, at / image.width as usize);
+    let found = image.pixels[at];
+    Err(Error::incomplete(place, format!("expected finite radiance, found {found:?} in pixel ({x}, {y})")))
+}
+
+/// An estimate whose interval is rounded to 6 significant digits: quantiles and resampling deserve no more.
+fn round_interval(estimate: Estimate) -> Estimate {
+    Estimate { ci95: estimate.ci95.map(|ends| ends.map(round_6)), ..estimate }
+}
+
+/// The number nearest to `x` among those of 6 significant decimal digits.
+fn round_6(x: f64) -> f64 {
+    // Decimal text is exact in both directions, so no platform differs; a number's own text always reads.
+    format!("{x:.5e}").parse().unwrap_or(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_keep_six_digits() {
+        assert_eq!(round_6(0.123_456_789), 0.123_457);
+        assert_eq!(round_6(-1_234_567.0), -1_234_570.0);
+        assert_eq!(round_6(9.999_999e-12), 1e-11);
+        assert_eq!(round_6(0.0), 0.0);
+    }
+
+    #[test]
+    fn a_closed_form_has_no_noise_and_both_mean_squares_agree() {
+        let truth = Arc::new(Image { width: 2, height: 1, pixels: vec![[1.0, 2.0, 3.0], [0.0; 3]] });
+        let reference = ReferenceImages::new([truth.clone(), truth]);
+        assert_eq!(reference.noise_mse(), 0.0);
+        assert_eq!(reference.mean_value(), 1.0);
+        let image = Image { width: 2, height: 1, pixels: vec![[1.5, 2.0, 3.0], [0.0, -0.5, 0.0]] };
+        let e = errors(&image, &reference, "r", 1);
+        // Two differences of ±1/2 among six channels.
+        assert!((e.mse - 0.5 / 6.0).abs() < 1e-16 && e.mse == e.mse_unbiased && e.bias == 0.0, "{e:?}");
+    }
+
+    #[test]
+    fn a_pixel_that_is_no_number_is_named() {
+        let mut image = Image::black(3, 2);
+        assert_eq!(check_finite(&image, "x"), Ok(()));
+        image.pixels[5][1] = f32::INFINITY;
+        let error = check_finite(&image, "x").unwrap_err();
+        assert!(error.exit_code() == 4 && error.what.contains("pixel (2, 1)"), "{error}");
+    }
+}

@@ -1,0 +1,687 @@
+//! From an experiment to the ordered list of its items, each with an id and a seed that depend on content alone.
+//!
+//! A plan is a pure function of the experiment and of what the backend says of scenes and samplers. An item's id
+//! hashes what its result depends on; its seed comes from the experiment's seed, the purpose, the scene's name, the
+//! sampler, the spp and the replicate. No list position goes into either, so adding a sampler, a scene, an spp or a
+//! replicate leaves every existing image as it is.
+
+use std::collections::{HashMap, HashSet};
+
+use super::backend::{Algorithms, Backend, Estimator, SceneFacts, Size, Stage};
+use super::identity::{Fingerprint, SeedOf};
+use super::results::{Count, Kind};
+use super::spec::{Experiment, Pictures};
+use crate::error::{Error, Result, did_you_mean};
+
+/// One image to render.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ImageWork {
+    /// `ReferenceHalf`, `Render`, `Picture` or `Stage`.
+    pub kind: Kind,
+    /// Scene name.
+    pub scene: String,
+    /// Sampler in canonical form.
+    pub sampler: String,
+    /// Samples per pixel.
+    pub spp: Count,
+    /// Replicate, or half of a reference.
+    pub replicate: u32,
+    /// Seed of the randomisation.
+    pub seed: u64,
+    /// Image size.
+    pub size: Size,
+    /// Light estimator.
+    pub estimator: Estimator,
+    /// How much of the picture is sampled.
+    pub stage: Stage,
+    /// Id of the reference that the image is compared with.
+    pub reference_id: Option<String>,
+}
+
+impl ImageWork {
+    /// Samples to render: spp taken × pixels.
+    pub fn samples(&self) -> u64 {
+        u64::from(self.spp.taken) * self.size.pixels()
+    }
+}
+
+/// What a reference is made of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ReferenceSource {
+    /// A closed form; the image is kept under the reference's own id.
+    Exact,
+    /// Two independent images.
+    Halves {
+        /// Their ids.
+        ids: [String; 2],
+        /// Their sampler in canonical form.
+        sampler: String,
+        /// Samples per pixel of each.
+        spp: Count,
+    },
+}
+
+/// One reference.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReferenceWork {
+    /// Scene name.
+    pub scene: String,
+    /// Image size.
+    pub size: Size,
+    /// What it is made of.
+    pub source: ReferenceSource,
+}
+
+/// All replicates of one sampler at one spp.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct EnsembleWork {
+    /// Scene name.
+    pub scene: String,
+    /// Sampler in canonical form.
+    pub sampler: String,
+    /// Samples per pixel.
+    pub spp: Count,
+    /// Image size.
+    pub size: Size,
+    /// Light estimator.
+    pub estimator: Estimator,
+    /// Id of the reference.
+    pub reference_id: String,
+    /// Ids of the replicates.
+    pub members: Vec<String>,
+}
+
+/// Metrics of one point set.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PointsWork {
+    /// Sampler in canonical form.
+    pub sampler: String,
+    /// Number of points.
+    pub n: Count,
+    /// Replicate.
+    pub replicate: u32,
+    /// Seed of the randomisation.
+    pub seed: u64,
+    /// Names of the metrics.
+    pub metrics: Vec<String>,
+}
+
+/// What an item does.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Work {
+    /// Renders one image, and compares it where it has a reference.
+    Image(ImageWork),
+    /// Makes one reference of its halves, or by a closed form.
+    Reference(ReferenceWork),
+    /// Measures replicates together.
+    Ensemble(EnsembleWork),
+    /// Measures one point set.
+    Points(PointsWork),
+}
+
+/// One item of a plan.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WorkItem {
+    /// Hash of everything that the result depends on.
+    pub id: String,
+    /// Algorithm number of the metrics at planning time.
+    pub metrics_algorithm: u32,
+    /// Whether a report shows the item's image itself, not only numbers about it.
+    pub is_shown: bool,
+    /// What to do.
+    pub work: Work,
+}
+
+impl WorkItem {
+    /// The sort of item.
+    pub fn kind(&self) -> Kind {
+        match &self.work {
+            Work::Image(work) => work.kind,
+            Work::Reference(_) => Kind::Reference,
+            Work::Ensemble(_) => Kind::Ensemble,
+            Work::Points(_) => Kind::Points,
+        }
+    }
+
+    /// The sampler compared or used; none for a closed form.
+    pub fn sampler(&self) -> Option<&str> {
+        match &self.work {
+            Work::Image(work) => Some(&work.sampler),
+            Work::Ensemble(work) => Some(&work.sampler),
+            Work::Points(work) => Some(&work.sampler),
+            Work::Reference(ReferenceWork { source: ReferenceSource::Halves { sampler, .. }, .. }) => Some(sampler),
+            Work::Reference(_) => None,
+        }
+    }
+
+    /// The seed, where the item draws anything.
+    pub fn seed(&self) -> Option<u64> {
+        match &self.work {
+            Work::Image(work) => Some(work.seed),
+            Work::Points(work) => Some(work.seed),
+            Work::Reference(_) | Work::Ensemble(_) => None,
+        }
+    }
+
+    /// Samples to render.
+    pub fn samples(&self) -> u64 {
+        match &self.work {
+            Work::Image(work) => work.samples(),
+            _ => 0,
+        }
+    }
+
+    /// Pairs of points to look at: the metrics take a time that grows with n².
+    pub fn pairs(&self) -> u64 {
+        match &self.work {
+            Work::Points(work) => u64::from(work.n.taken).pow(2) * work.metrics.len() as u64,
+            _ => 0,
+        }
+    }
+
+    /// Size of the image that the item keeps on disk.
+    pub fn kept_image(&self) -> Option<Size> {
+        match &self.work {
+            Work::Image(work) => Some(work.size),
+            Work::Reference(ReferenceWork { source: ReferenceSource::Exact, size, .. }) => Some(*size),
+            _ => None,
+        }
+    }
+
+    /// The item in a few words, for progress and messages.
+    pub fn label(&self) -> String {
+        match &self.work {
+            Work::Image(work) => {
+                let what = match work.kind {
+                    Kind::ReferenceHalf => format!("reference half {}", work.replicate),
+                    Kind::Picture => "picture".to_owned(),
+                    Kind::Stage => format!("stage {}", work.stage.name()),
+                    _ => format!("replicate {}", work.replicate),
+                };
+                format!("{} {} {} spp {} {what}", work.scene, work.sampler, work.spp.asked, work.size)
+            }
+            Work::Reference(work) => format!("{} {} reference", work.scene, work.size),
+            Work::Ensemble(work) => format!("{} {} {} spp ensemble", work.scene, work.sampler, work.spp.asked),
+            Work::Points(work) => format!("{} {} points replicate {}", work.sampler, work.n.asked, work.replicate),
+        }
+    }
+}
+
+/// A sampler of the experiment; texts that mean the same one are together.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PlannedSampler {
+    /// Full form.
+    pub canonical: String,
+    /// The texts of the experiment that mean it.
+    pub names: Vec<String>,
+}
+
+/// All items of an experiment in the order in which they are done and recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// What was asked for.
+    pub experiment: Experiment,
+    /// Its scenes, in its order.
+    pub scenes: Vec<SceneFacts>,
+    /// The compared samplers, each once, in the order in which they first occur.
+    pub samplers: Vec<PlannedSampler>,
+    /// The reference's sampler.
+    pub reference_sampler: PlannedSampler,
+    /// The items.
+    pub items: Vec<WorkItem>,
+    /// What the plan made of the experiment, in sentences for a reader.
+    pub notes: Vec<String>,
+    positions: HashMap<String, usize>,
+}
+
+impl Plan {
+    /// The item with this id.
+    pub fn position(&self, id: &str) -> Option<usize> {
+        self.positions.get(id).copied()
+    }
+
+    /// What the experiment calls a sampler.
+    pub fn names(&self, canonical: &str) -> &[String] {
+        let known = self.samplers.iter().chain([&self.reference_sampler]);
+        known
+            .filter(|sampler| sampler.canonical == canonical)
+            .map(|sampler| sampler.names.as_slice())
+            .next()
+            .unwrap_or(&[])
+    }
+
+    /// Ids of the images that a reference is made of: two halves, or the closed form twice.
+    ///
+    /// # Panics
+    /// Where the plan has no such reference.
+    pub fn reference_images(&self, reference_id: &str) -> [&str; 2] {
+        let position = self.positions[reference_id];
+        match &self.items[position].work {
+            Work::Reference(ReferenceWork { source: ReferenceSource::Halves { ids: [a, b], .. }, .. }) => [a, b],
+            Work::Reference(_) => [&self.items[position].id; 2],
+            _ => panic!("{reference_id} is no reference"),
+        }
+    }
+
+    /// Ids of the images that an item needs, its own among them.
+    pub fn images_needed(&self, position: usize) -> Vec<&str> {
+        let item = &self.items[position];
+        match &item.work {
+            Work::Points(_) => Vec::new(),
+            Work::Reference(_) => self.reference_images(&item.id).to_vec(),
+            Work::Image(work) => {
+                let reference = work.reference_id.iter().flat_map(|id| self.reference_images(id));
+                reference.chain([item.id.as_str()]).collect()
+            }
+            Work::Ensemble(work) => {
+                let reference = self.reference_images(&work.reference_id);
+                reference.into_iter().chain(work.members.iter().map(String::as_str)).collect()
+            }
+        }
+    }
+
+    /// For each position the images that no later item needs.
+    pub fn released_after(&self) -> Vec<Vec<String>> {
+        let mut last: HashMap<&str, usize> = HashMap::new();
+        for position in 0..self.items.len() {
+            for id in self.images_needed(position) {
+                last.insert(id, position);
+            }
+        }
+        let mut released = vec![Vec::new(); self.items.len()];
+        for (id, position) in last {
+            released[position].push(id.to_owned());
+        }
+        released
+    }
+}
+
+/// Plans an experiment.
+///
+/// # Errors
+/// Kind `Input`: a scene or sampler that cannot be read, two scenes of one name, a reference sampler that is compared
+/// or has nothing random in it, an unknown metric, equal seeds.
+pub fn plan(experiment: &Experiment, backend: &dyn Backend) -> Result<Plan> {
+    let scenes = open_scenes(experiment, backend)?;
+    let samplers = read_samplers(experiment, backend)?;
+    let reference_sampler = read_reference_sampler(experiment, backend, &samplers, &scenes)?;
+    check_metrics(experiment, backend)?;
+    let mut planner = Planner {
+        experiment,
+        backend,
+        reference: &reference_sampler,
+        is_shown: false,
+        items: Vec::new(),
+        notes: Vec::new(),
+    };
+    planner.note_samplers(&samplers);
+    planner.add_points(&samplers);
+    for (name, scene) in experiment.scenes.iter().zip(&scenes) {
+        planner.add_statistics(scene, experiment.size.of(name, scene.size), &samplers);
+    }
+    if let Some(pictures) = &experiment.pictures {
+        for (_, scene) in experiment.scenes.iter().zip(&scenes).filter(|(name, _)| **name == pictures.scene) {
+            planner.add_pictures(scene, pictures, &samplers);
+        }
+    }
+    let Planner { items, notes, .. } = planner;
+    refuse_equal_seeds(&items, &experiment.place)?;
+    let positions: HashMap<String, usize> = items.iter().enumerate().map(|(i, item)| (item.id.clone(), i)).collect();
+    assert_eq!(positions.len(), items.len(), "two items of one id");
+    Ok(Plan { experiment: experiment.clone(), scenes, samplers, reference_sampler, items, notes, positions })
+}
+
+/// Items that draw numbers have seeds of their own: an image must share no randomness with what it is compared with.
+///
+/// # Errors
+/// Kind `Input` that names both items.
+pub fn refuse_equal_seeds(items: &[WorkItem], place: &str) -> Result<()> {
+    let mut seen: HashMap<u64, &WorkItem> = HashMap::new();
+    for item in items {
+        let Some(seed) = item.seed() else { continue };
+        if let Some(other) = seen.insert(seed, item) {
+            let what = format!(
+                "expected every item to have a seed of its own, found {seed} for both \"{}\" and \"{}\"; choose another experiment seed",
+                other.label(),
+                item.label()
+            );
+            return Err(Error::input(format!("{place}: seed"), what));
+        }
+    }
+    Ok(())
+}
+
+/// Opens the scenes; their short names are in rows and seeds, so no two may share one.
+fn open_scenes(experiment: &Experiment, backend: &dyn Backend) -> Result<Vec<SceneFacts>> {
+    let mut names = HashSet::new();
+    let mut scenes = Vec::new();
+    for (i, scene) in experiment.scenes.iter().enumerate() {
+        let facts = backend.open_scene(scene)?;
+        if !names.insert(facts.name.clone()) {
+            let what = format!("expected scenes of different names, found {:?} again", facts.name);
+            return Err(Error::input(format!("{}: scenes[{i}]", experiment.place), what));
+        }
+        scenes.push(facts);
+    }
+    Ok(scenes)
+}
+
+/// Reads the compared samplers and puts texts that mean the same one together.
+fn read_samplers(experiment: &Experiment, backend: &dyn Backend) -> Result<Vec<PlannedSampler>> {
+    let mut samplers: Vec<PlannedSampler> = Vec::new();
+    for (i, text) in experiment.samplers.iter().enumerate() {
+        let canonical = read_sampler(text, &format!("samplers[{i}]"), experiment, backend)?;
+        match samplers.iter_mut().find(|known| known.canonical == canonical) {
+            Some(known) => known.names.push(text.clone()),
+            None => samplers.push(PlannedSampler { canonical, names: vec![text.clone()] }),
+        }
+    }
+    Ok(samplers)
+}
+
+/// Reads one sampler; the message says where in the experiment it stands.
+fn read_sampler(text: &str, key: &str, experiment: &Experiment, backend: &dyn Backend) -> Result<String> {
+    let place = |error: Error| Error { place: format!("{}: {key}: {}", experiment.place, error.place), ..error };
+    backend.parse_sampler(text).map_err(place)
+}
+
+/// Reads the reference's sampler, which has to be independent of everything compared.
+fn read_reference_sampler(
+    experiment: &Experiment,
+    backend: &dyn Backend,
+    samplers: &[PlannedSampler],
+    scenes: &[SceneFacts],
+) -> Result<PlannedSampler> {
+    let text = &experiment.reference.sampler;
+    let canonical = read_sampler(text, "reference.sampler", experiment, backend)?;
+    let refuse = |what: String| Err(Error::input(format!("{}: reference.sampler", experiment.place), what));
+    if let Some(compared) = samplers.iter().find(|sampler| sampler.canonical == canonical) {
+        let names = compared.names.join(" and ");
+        return refuse(format!(
+            "expected a sampler that is not compared, found {text:?}, which is {names}: {canonical}"
+        ));
+    }
+    let is_fixed = |scene: &&SceneFacts| !scene.exact_reference && !backend.is_random(&canonical, Some(&scene.name));
+    if let Some(scene) = scenes.iter().find(is_fixed) {
+        return refuse(format!(
+            "expected a sampler with something random in it, found {text:?}, which is {canonical}: both halves of {} would be one image",
+            scene.name
+        ));
+    }
+    Ok(PlannedSampler { canonical, names: vec![text.clone()] })
+}
+
+/// Every metric asked for has to be known.
+fn check_metrics(experiment: &Experiment, backend: &dyn Backend) -> Result<()> {
+    let known = backend.point_metric_names();
+    let asked = experiment.points.iter().flat_map(|points| points.metrics.iter().enumerate());
+    for (i, metric) in asked {
+        if !known.contains(&metric.as_str()) {
+            let near = did_you_mean(metric, known.iter().copied());
+            let near = near.map(|near| format!("; did you mean {near:?}?")).unwrap_or_default();
+            let what = format!("expected one of the metrics {}, found {metric:?}{near}", known.join(" "));
+            return Err(Error::input(format!("{}: points.metrics[{i}]", experiment.place), what));
+        }
+    }
+    Ok(())
+}
+
+/// Collects items.
+struct Planner<'a> {
+    experiment: &'a Experiment,
+    backend: &'a dyn Backend,
+    reference: &'a PlannedSampler,
+    /// Whether the items added now are looked at.
+    is_shown: bool,
+    items: Vec<WorkItem>,
+    notes: Vec<String>,
+}
+
+impl Planner<'_> {
+    /// Says what became of the list of samplers.
+    fn note_samplers(&mut self, samplers: &[PlannedSampler]) {
+        for sampler in samplers {
+            if let [first @ .., last] = sampler.names.as_slice()
+                && !first.is_empty()
+            {
+                let what = format!("{} and {last} are one sampler, {}: done once", first.join(", "), sampler.canonical);
+                self.notes.push(what);
+            }
+        }
+    }
+
+    /// Says what becomes of replicates and spp in one scene.
+    fn note_scene(&mut self, scene: &SceneFacts, samplers: &[PlannedSampler]) {
+        if scene.exact_reference {
+            self.notes.push(format!("{}: the reference is a closed form", scene.name));
+        }
+        for sampler in samplers {
+            let what = format!("{}, {}", scene.name, sampler.names.join(", "));
+            if self.experiment.replicates > 1 && !self.backend.is_random(&sampler.canonical, Some(&scene.name)) {
+                self.notes.push(format!("{what}: nothing random, so 1 replicate and no variance"));
+            }
+            for &asked in &self.experiment.spp {
+                let Count { taken, .. } = self.count(&sampler.canonical, Some(scene), asked);
+                if taken != asked {
+                    self.notes.push(format!("{what}: {asked} spp asked, {taken} taken"));
+                }
+            }
+        }
+    }
+
+    /// Counts of a sampler for a scene, or of a point set where there is none.
+    fn count(&self, sampler: &str, scene: Option<&SceneFacts>, asked: u32) -> Count {
+        Count { asked, taken: self.backend.taken(sampler, scene.map(|scene| scene.name.as_str()), asked) }
+    }
+
+    /// Replicates worth making.
+    fn replicates(&self, sampler: &str, scene: Option<&SceneFacts>, asked: u32) -> u32 {
+        if self.backend.is_random(sampler, scene.map(|scene| scene.name.as_str())) { asked } else { 1 }
+    }
+
+    /// Adds an item unless the same one is there already, and gives its id.
+    fn push(&mut self, id: String, metrics_algorithm: u32, work: Work) -> String {
+        // Only closed forms can meet here: a scene's and its pictures' at one size.
+        if !self.items.iter().any(|item| item.id == id) {
+            self.items.push(WorkItem { id: id.clone(), metrics_algorithm, is_shown: self.is_shown, work });
+        }
+        id
+    }
+
+    /// Point-set metrics of every sampler.
+    fn add_points(&mut self, samplers: &[PlannedSampler]) {
+        let Some(points) = &self.experiment.points else { return };
+        for sampler in samplers {
+            for &asked in &points.n {
+                for replicate in 0..self.replicates(&sampler.canonical, None, points.replicates) {
+                    self.add_point_set(&sampler.canonical, asked, replicate, &points.metrics);
+                }
+            }
+        }
+    }
+
+    /// Point-set metrics of one set.
+    fn add_point_set(&mut self, sampler: &str, asked: u32, replicate: u32, metrics: &[String]) {
+        let n = self.count(sampler, None, asked);
+        let seed = self.seed("points", "", sampler, asked, replicate);
+        let numbers = self.backend.algorithms(sampler);
+        let id = Fingerprint::new("points")
+            .with("sampler", sampler)
+            .with("asked", n.asked)
+            .with("taken", n.taken)
+            .with("replicate", replicate)
+            .with("seed", seed)
+            .with("metrics", metrics.join(","))
+            .with("sampler algorithm", numbers.sampler)
+            .with("metrics algorithm", numbers.metrics)
+            .id();
+        let work = PointsWork { sampler: sampler.to_owned(), n, replicate, seed, metrics: metrics.to_vec() };
+        self.push(id, numbers.metrics, Work::Points(work));
+    }
+
+    /// One scene: its reference, then sampler by sampler and spp by spp the replicates and what they say together.
+    fn add_statistics(&mut self, scene: &SceneFacts, size: Size, samplers: &[PlannedSampler]) {
+        self.note_scene(scene, samplers);
+        let reference_id = self.add_reference(scene, size, self.experiment.reference.spp, "reference");
+        for sampler in samplers {
+            for &asked in &self.experiment.spp {
+                self.add_replicates(scene, size, sampler, asked, &reference_id);
+            }
+        }
+    }
+
+    /// The replicates of one sampler at one spp, and their ensemble.
+    fn add_replicates(
+        &mut self,
+        scene: &SceneFacts,
+        size: Size,
+        sampler: &PlannedSampler,
+        asked: u32,
+        reference_id: &str,
+    ) {
+        let estimator = self.experiment.estimator;
+        let spp = self.count(&sampler.canonical, Some(scene), asked);
+        let members: Vec<String> = (0..self.replicates(&sampler.canonical, Some(scene), self.experiment.replicates))
+            .map(|replicate| {
+                let work = ImageWork {
+                    kind: Kind::Render,
+                    scene: scene.name.clone(),
+                    sampler: sampler.canonical.clone(),
+                    spp,
+                    replicate,
+                    seed: self.seed("render", &scene.name, &sampler.canonical, asked, replicate),
+                    size,
+                    estimator,
+                    stage: Stage::Final,
+                    reference_id: Some(reference_id.to_owned()),
+                };
+                self.add_image(scene, work)
+            })
+            .collect();
+        let numbers = self.backend.algorithms(&sampler.canonical);
+        let id = Fingerprint::new("ensemble")
+            .with("members", members.join(","))
+            .with("reference", reference_id)
+            .with("metrics algorithm", numbers.metrics)
+            .id();
+        let work = EnsembleWork {
+            scene: scene.name.clone(),
+            sampler: sampler.canonical.clone(),
+            spp,
+            size,
+            estimator,
+            reference_id: reference_id.to_owned(),
+            members,
+        };
+        self.push(id, numbers.metrics, Work::Ensemble(work));
+    }
+
+    /// A reference and, where the scene has no closed form, its two halves; the reference's id.
+    fn add_reference(&mut self, scene: &SceneFacts, size: Size, asked: u32, purpose: &str) -> String {
+        let sampler = self.reference.canonical.clone();
+        let numbers = self.backend.algorithms(&sampler);
+        let (id, source) = if scene.exact_reference {
+            let id = Fingerprint::new("exact reference")
+                .with("scene", &scene.content_hash)
+                .with("size", size)
+                .with("exact algorithm", numbers.exact)
+                .id();
+            (id, ReferenceSource::Exact)
+        } else {
+            let spp = self.count(&sampler, Some(scene), asked);
+            let ids = [0, 1].map(|half| self.add_half(scene, size, spp, half, purpose));
+            let id = Fingerprint::new("reference").with("halves", ids.join(",")).id();
+            (id, ReferenceSource::Halves { ids, sampler, spp })
+        };
+        self.push(id, numbers.metrics, Work::Reference(ReferenceWork { scene: scene.name.clone(), size, source }))
+    }
+
+    /// One half of a reference. It stands for the truth, so it never takes the sheet's shortcut.
+    fn add_half(&mut self, scene: &SceneFacts, size: Size, spp: Count, half: u32, purpose: &str) -> String {
+        let sampler = self.reference.canonical.clone();
+        let work = ImageWork {
+            kind: Kind::ReferenceHalf,
+            scene: scene.name.clone(),
+            spp,
+            replicate: half,
+            seed: self.seed(purpose, &scene.name, &sampler, spp.asked, half),
+            sampler,
+            size,
+            estimator: Estimator::Unbiased,
+            stage: Stage::Final,
+            reference_id: None,
+        };
+        self.add_image(scene, work)
+    }
+
+    /// The pictures: a reference of their own, one image of each sampler, and the stages of the sheet's Figure 1.
+    fn add_pictures(&mut self, scene: &SceneFacts, pictures: &Pictures, samplers: &[PlannedSampler]) {
+        self.is_shown = true;
+        let reference_id = self.add_reference(scene, pictures.size, pictures.reference_spp, "picture reference");
+        for sampler in samplers {
+            let work = ImageWork {
+                kind: Kind::Picture,
+                scene: scene.name.clone(),
+                sampler: sampler.canonical.clone(),
+                spp: self.count(&sampler.canonical, Some(scene), pictures.spp),
+                replicate: 0,
+                seed: self.seed("picture", &scene.name, &sampler.canonical, pictures.spp, 0),
+                size: pictures.size,
+                estimator: self.experiment.estimator,
+                stage: Stage::Final,
+                reference_id: Some(reference_id.clone()),
+            };
+            self.add_image(scene, work);
+        }
+        for stage in Stage::ALL {
+            self.add_stage(scene, pictures.size, stage);
+        }
+    }
+
+    /// One stage of the sheet's Figure 1, at the spp of the scene's own file.
+    fn add_stage(&mut self, scene: &SceneFacts, size: Size, stage: Stage) {
+        let sampler = self.reference.canonical.clone();
+        // Every sample of the first stage is the pixel's centre: one says all.
+        let asked = if stage == Stage::Start { 1 } else { scene.spp };
+        let purpose = format!("stage {}", stage.name());
+        let work = ImageWork {
+            kind: Kind::Stage,
+            scene: scene.name.clone(),
+            spp: self.count(&sampler, Some(scene), asked),
+            replicate: 0,
+            seed: self.seed(&purpose, &scene.name, &sampler, asked, 0),
+            sampler,
+            size,
+            estimator: Estimator::Unbiased,
+            stage,
+            reference_id: None,
+        };
+        self.add_image(scene, work);
+    }
+
+    /// One image; its id hashes what the pixels depend on, so a row may be measured anew against another reference
+    /// without rendering again.
+    fn add_image(&mut self, scene: &SceneFacts, work: ImageWork) -> String {
+        let Algorithms { renderer, sampler, estimator, metrics, .. } = self.backend.algorithms(&work.sampler);
+        let id = Fingerprint::new("image")
+            .with("scene", &scene.content_hash)
+            .with("sampler", &work.sampler)
+            .with("asked", work.spp.asked)
+            .with("taken", work.spp.taken)
+            .with("replicate", work.replicate)
+            .with("seed", work.seed)
+            .with("size", work.size)
+            .with("estimator", work.estimator.name())
+            .with("stage", work.stage.name())
+            .with("renderer algorithm", renderer)
+            .with("sampler algorithm", sampler)
+            .with("estimator algorithm", estimator)
+            .id();
+        self.push(id, metrics, Work::Image(work))
+    }
+
+    /// The seed of an item.
+    fn seed(&self, purpose: &str, scene: &str, sampler: &str, asked: u32, replicate: u32) -> u64 {
+        SeedOf { experiment: self.experiment.seed, purpose, scene, sampler, asked, replicate }.derive()
+    }
+}

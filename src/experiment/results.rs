@@ -1,0 +1,545 @@
+//! Rows: one line of `results.jsonl` for each finished item, typed, and the timings beside them.
+//!
+//! A line is whole or ignored: a last line that was torn by a kill is dropped and its item done again; any other
+//! line that does not read is an error. Seeds are decimal texts, since 64 bits do not fit a JSON number; numbers are
+//! written in their shortest form that reads back to the same bits, intervals rounded to 6 significant digits.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use super::backend::{Estimator, PointMetrics, SceneFacts, Size, Stage};
+
+use super::spec::Experiment;
+use crate::error::{Error, Result};
+use crate::film::write_whole;
+use crate::stats::Estimate;
+
+/// Version of the row format, field `schema`.
+pub const SCHEMA: u32 = 1;
+
+/// Where the rows of an output folder are.
+pub fn results_path(out: &Path) -> PathBuf {
+    out.join("results.jsonl")
+}
+
+/// Where the timings of an output folder are.
+pub fn timings_path(out: &Path) -> PathBuf {
+    out.join("timings.jsonl")
+}
+
+/// Where an output folder says what was run.
+pub fn about_path(out: &Path) -> PathBuf {
+    out.join("experiment.json")
+}
+
+/// Where the image of an item is.
+pub fn image_path(out: &Path, id: &str) -> PathBuf {
+    out.join("images").join(format!("{id}.exr"))
+}
+
+/// The sort of an item.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Metrics of one point set.
+    Points,
+    /// One of the two independent images whose mean is a reference.
+    ReferenceHalf,
+    /// A reference: its halves together, or a closed form.
+    Reference,
+    /// One replicate of one sampler at one spp, compared with the reference.
+    Render,
+    /// All replicates of one sampler at one spp: bias², variance, intervals.
+    Ensemble,
+    /// A larger image to look at, compared with a reference of its own.
+    Picture,
+    /// One of the four pictures of the sheet's Figure 1.
+    Stage,
+}
+
+/// The kind as written in rows.
+pub fn kind_name(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Points => "points",
+        Kind::ReferenceHalf => "reference-half",
+        Kind::Reference => "reference",
+        Kind::Render => "render",
+        Kind::Ensemble => "ensemble",
+        Kind::Picture => "picture",
+        Kind::Stage => "stage",
+    }
+}
+
+/// Samples (or points): as asked for, and as the sampler took.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Count {
+    /// Asked for.
+    pub asked: u32,
+    /// Taken; differs where a sampler has no set of the size asked for.
+    pub taken: u32,
+}
+
+/// Errors of one image against its reference (METHODS §6), over pixel-channels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ImageErrors {
+    /// Id of the reference.
+    pub reference_id: String,
+    /// Algorithm number of the metrics.
+    pub metrics_algorithm: u32,
+    /// Mean square difference from the mean of the two halves: holds the reference's noise too.
+    pub mse: f64,
+    /// mean((T − R1)(T − R2)): free of the reference's noise on average, so it may be below 0.
+    pub mse_unbiased: f64,
+    /// mean(d² / (R² + 0.01)).
+    pub rel_mse: f64,
+    /// Mean absolute difference.
+    pub mae: f64,
+    /// Mean signed difference, image minus reference.
+    pub bias: f64,
+    /// Correlation of the error between neighbouring pixels; null where the error is not above the reference's noise.
+    pub error_autocorrelation: Option<f64>,
+}
+
+/// One image: kinds `reference-half`, `render`, `picture` and `stage`; the errors are there for `render` and `picture`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ImageRow {
+    /// Row format, [`SCHEMA`].
+    pub schema: u32,
+    /// The item.
+    pub id: String,
+    /// Sort of item.
+    pub kind: Kind,
+    /// Scene name.
+    pub scene: String,
+    /// Sampler in canonical form.
+    pub sampler: String,
+    /// What the experiment calls the sampler.
+    pub names: Vec<String>,
+    /// Samples per pixel.
+    pub spp: Count,
+    /// Replicate, from 0; for a reference half its number, 0 or 1.
+    pub replicate: u32,
+    /// Seed of the randomisation.
+    #[serde(serialize_with = "decimal", deserialize_with = "from_decimal")]
+    pub seed: u64,
+    /// Light estimator.
+    pub estimator: Estimator,
+    /// How much of the picture is sampled.
+    pub stage: Stage,
+    /// Image size.
+    pub size: Size,
+    /// Mean over all pixel-channels.
+    pub mean: f64,
+    /// Digest of the pixels ([`pixel_hash`](super::identity::pixel_hash)): equal where two images are equal bit for bit.
+    pub pixels: String,
+    /// Errors against the reference.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub errors: Option<ImageErrors>,
+}
+
+/// Kind `reference`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ReferenceRow {
+    /// Row format, [`SCHEMA`].
+    pub schema: u32,
+    /// The item; other rows name it as `reference_id`.
+    pub id: String,
+    /// `reference`.
+    pub kind: Kind,
+    /// Scene name.
+    pub scene: String,
+    /// Sampler in canonical form, or `exact` for a closed form.
+    pub sampler: String,
+    /// Samples per pixel of each half; null for a closed form.
+    pub spp: Option<Count>,
+    /// Image size.
+    pub size: Size,
+    /// Ids of the two halves; null for a closed form.
+    pub halves: Option<[String; 2]>,
+    /// Algorithm number of the metrics.
+    pub metrics_algorithm: u32,
+    /// Mean square error of the mean of the halves, mean((R1 − R2)²)/4; 0 for a closed form.
+    pub noise_mse: f64,
+    /// Mean over all pixel-channels.
+    pub mean: f64,
+    /// Digest of the pixels of the mean of the halves; for a closed form those of its image.
+    pub pixels: String,
+}
+
+/// Kind `ensemble`: what the replicates of one sampler at one spp say together.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EnsembleRow {
+    /// Row format, [`SCHEMA`].
+    pub schema: u32,
+    /// The item.
+    pub id: String,
+    /// `ensemble`.
+    pub kind: Kind,
+    /// Scene name.
+    pub scene: String,
+    /// Sampler in canonical form.
+    pub sampler: String,
+    /// What the experiment calls the sampler.
+    pub names: Vec<String>,
+    /// Samples per pixel.
+    pub spp: Count,
+    /// Light estimator.
+    pub estimator: Estimator,
+    /// Image size.
+    pub size: Size,
+    /// Id of the reference.
+    pub reference_id: String,
+    /// Algorithm number of the metrics.
+    pub metrics_algorithm: u32,
+    /// Number of replicates; 1 where the sampler has nothing random in it.
+    pub replicates: u32,
+    /// Unbiased mean square error, with its 95 % interval over replicates and reference noise.
+    pub mse: Estimate,
+    /// Its root; null where the estimate of the square is below 0.
+    pub rmse: Option<Estimate>,
+    /// Relative mean square error, ε = 0.01.
+    pub rel_mse: Estimate,
+    /// Mean square of the expected image's error; may be below 0.
+    pub bias2: Estimate,
+    /// Mean variance of a pixel-channel between replicates; null where there is one replicate.
+    pub variance: Option<Estimate>,
+    /// Mean signed error.
+    pub bias: Estimate,
+    /// Correlation of the error between neighbouring pixels; null where a replicate's is not defined.
+    pub error_autocorrelation: Option<Estimate>,
+    /// Ids of the replicates.
+    pub members: Vec<String>,
+}
+
+/// Kind `points`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PointsRow {
+    /// Row format, [`SCHEMA`].
+    pub schema: u32,
+    /// The item.
+    pub id: String,
+    /// `points`.
+    pub kind: Kind,
+    /// Sampler in canonical form.
+    pub sampler: String,
+    /// What the experiment calls the sampler.
+    pub names: Vec<String>,
+    /// Number of points.
+    pub n: Count,
+    /// Replicate, from 0.
+    pub replicate: u32,
+    /// Seed of the randomisation.
+    #[serde(serialize_with = "decimal", deserialize_with = "from_decimal")]
+    pub seed: u64,
+    /// Algorithm number of the metrics.
+    pub metrics_algorithm: u32,
+    /// Values by name; null where a metric is not defined for the set.
+    pub metrics: PointMetrics,
+}
+
+/// One line of `results.jsonl`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Row {
+    /// Kinds `reference-half`, `render`, `picture`, `stage`.
+    Image(ImageRow),
+    /// Kind `reference`.
+    Reference(ReferenceRow),
+    /// Kind `ensemble`.
+    Ensemble(EnsembleRow),
+    /// Kind `points`.
+    Points(PointsRow),
+}
+
+/// What every row starts with.
+#[derive(Deserialize)]
+struct Head {
+    schema: u32,
+    kind: Kind,
+}
+
+impl Row {
+    /// Reads one line.
+    ///
+    /// # Errors
+    /// What was expected and found, without a place.
+    pub fn parse(line: &str) -> std::result::Result<Self, String> {
+        let bad = |e: serde_json::Error| format!("expected a row of results, found: {e}");
+        let head: Head = serde_json::from_str(line).map_err(bad)?;
+        if head.schema != SCHEMA {
+            return Err(format!("expected rows of schema {SCHEMA}, found schema {}", head.schema));
+        }
+        match head.kind {
+            Kind::Points => serde_json::from_str(line).map(Self::Points).map_err(bad),
+            Kind::Reference => serde_json::from_str(line).map(Self::Reference).map_err(bad),
+            Kind::Ensemble => serde_json::from_str(line).map(Self::Ensemble).map_err(bad),
+            Kind::ReferenceHalf | Kind::Stage => serde_json::from_str(line).map(Self::Image).map_err(bad),
+            Kind::Render | Kind::Picture => match serde_json::from_str(line).map_err(bad)? {
+                // A flattened part that does not read is `None`: here it has to be there.
+                ImageRow { errors: None, .. } => Err("expected a row with image errors, found none".to_owned()),
+                row => Ok(Self::Image(row)),
+            },
+        }
+    }
+
+    /// One line, without its end.
+    pub fn to_line(&self) -> String {
+        line(self)
+    }
+
+    /// The item's id.
+    pub fn id(&self) -> &str {
+        match self {
+            Self::Image(row) => &row.id,
+            Self::Reference(row) => &row.id,
+            Self::Ensemble(row) => &row.id,
+            Self::Points(row) => &row.id,
+        }
+    }
+
+    /// The sort of item.
+    pub fn kind(&self) -> Kind {
+        match self {
+            Self::Image(row) => row.kind,
+            Self::Reference(row) => row.kind,
+            Self::Ensemble(row) => row.kind,
+            Self::Points(row) => row.kind,
+        }
+    }
+
+    /// The digest of the pixels of the image kept under the row's id, where there is one.
+    pub fn kept_pixels(&self) -> Option<&str> {
+        match self {
+            Self::Image(row) => Some(&row.pixels),
+            Self::Reference(row) if row.halves.is_none() => Some(&row.pixels),
+            _ => None,
+        }
+    }
+
+    /// Writes down what the experiment calls the sampler now: an alias may have come or gone since the row was made.
+    pub(super) fn set_names(&mut self, now: &[String]) {
+        match self {
+            Self::Image(ImageRow { names, .. })
+            | Self::Ensemble(EnsembleRow { names, .. })
+            | Self::Points(PointsRow { names, .. }) => *names = now.to_vec(),
+            Self::Reference(_) => {}
+        }
+    }
+}
+
+/// One line of `timings.jsonl`: the only place with values from a clock.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Timing {
+    /// The item.
+    pub id: String,
+    /// Wall seconds of rendering, without loading the scene or writing the image.
+    pub seconds: f64,
+    /// Samples rendered: spp taken × pixels.
+    pub samples: u64,
+    /// The machine, in words.
+    pub host: String,
+    /// Threads that worked.
+    pub threads: usize,
+    /// Load average of the last minute when the item began; null where the system tells none.
+    pub load: Option<f64>,
+}
+
+/// `experiment.json`: what a folder's rows are the results of. Free of anything from a clock.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct About {
+    /// Row format, [`SCHEMA`].
+    pub schema: u32,
+    /// Version of the program.
+    pub version: String,
+    /// The command that makes this folder.
+    pub command: String,
+    /// The experiment as it was read, defaults made explicit.
+    pub experiment: Experiment,
+    /// Its scenes.
+    pub scenes: Vec<SceneFacts>,
+    /// What the plan made of the experiment, in sentences.
+    pub notes: Vec<String>,
+}
+
+/// Reads `results.jsonl`: all whole rows, in the order of the file.
+///
+/// # Errors
+/// Kind `Input` with the line number where a line other than a torn last one does not read, or where there is no file.
+pub fn read(path: &Path) -> Result<Vec<Row>> {
+    Ok(lines(path, Row::parse)?.0)
+}
+
+/// Reads `timings.jsonl`, torn last line ignored; where an item was timed twice both lines are there.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_timings(path: &Path) -> Result<Vec<Timing>> {
+    Ok(lines(path, parse_timing)?.0)
+}
+
+/// Reads `experiment.json`.
+///
+/// # Errors
+/// Kind `Input` where it is missing or does not read.
+pub fn read_about(path: &Path) -> Result<About> {
+    let bad = |e: &dyn std::fmt::Display| Error::input(path.display(), format!("expected what was run, found: {e}"));
+    serde_json::from_slice(&std::fs::read(path).map_err(|e| bad(&e))?).map_err(|e| bad(&e))
+}
+
+/// One line of `timings.jsonl`.
+pub(super) fn parse_timing(line: &str) -> std::result::Result<Timing, String> {
+    serde_json::from_str(line).map_err(|e| format!("expected a timing, found: {e}"))
+}
+
+/// Reads a file of one JSON value a line; the flag says whether the file is exactly its whole lines.
+///
+/// A last line without an end that does not read was torn and is dropped; one that reads is whole but for its end.
+pub(super) fn lines<T>(path: &Path, parse: impl Fn(&str) -> std::result::Result<T, String>) -> Result<(Vec<T>, bool)> {
+    let bytes = std::fs::read(path)
+        .map_err(|e| Error::input(path.display(), format!("expected a file of results, found: {e}")))?;
+    let mut values = Vec::new();
+    for (number, bytes) in bytes.split_inclusive(|&byte| byte == b'\n').enumerate() {
+        let whole = bytes.ends_with(b"\n");
+        let value = std::str::from_utf8(bytes).map_err(|e| e.to_string()).and_then(|text| parse(text.trim_end()));
+        match value {
+            Ok(value) => values.push(value),
+            Err(_) if !whole => {}
+            Err(what) => return Err(Error::input(format!("{}:{}", path.display(), number + 1), what)),
+        }
+    }
+    Ok((values, bytes.is_empty() || bytes.ends_with(b"\n")))
+}
+
+/// As [`lines`], where a missing file is an empty one.
+pub(super) fn lines_if_any<T>(
+    path: &Path,
+    parse: impl Fn(&str) -> std::result::Result<T, String>,
+) -> Result<(Vec<T>, bool)> {
+    if path.exists() { lines(path, parse) } else { Ok((Vec::new(), true)) }
+}
+
+/// Writes a file of one JSON value a line, whole or not at all; not touched where it would not change.
+pub(super) fn write_lines<'a, T: Serialize + 'a>(path: &Path, values: impl Iterator<Item = &'a T>) -> Result<()> {
+    let mut text = String::new();
+    for value in values {
+        text.push_str(&line(value));
+        text.push('\n');
+    }
+    write_if_changed(path, text.as_bytes())
+}
+
+/// Writes `bytes` whole or not at all; a file that has them already keeps its time of change.
+pub(super) fn write_if_changed(path: &Path, bytes: &[u8]) -> Result<()> {
+    if std::fs::read(path).is_ok_and(|old| old == bytes) { Ok(()) } else { write_whole(path, bytes) }
+}
+
+/// One value as one line of JSON.
+pub(super) fn line(value: &impl Serialize) -> String {
+    // Rows are plain structs with text keys: nothing in them can fail to serialise.
+    serde_json::to_string(value).expect("a row serialises")
+}
+
+/// Seeds as decimal texts.
+fn decimal<S: Serializer>(seed: &u64, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+    serializer.collect_str(seed)
+}
+
+/// Seeds from decimal texts.
+fn from_decimal<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result<u64, D::Error> {
+    let text = String::deserialize(deserializer)?;
+    text.parse().map_err(|_| serde::de::Error::custom(format!("expected a seed as a decimal text, found {text:?}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(seed: u64, mse: f64) -> Row {
+        Row::Image(ImageRow {
+            schema: SCHEMA,
+            id: "0123456789abcdef".to_owned(),
+            kind: Kind::Render,
+            scene: "a01".to_owned(),
+            sampler: "ld:shuffle:owen@each".to_owned(),
+            names: vec!["ld:best".to_owned()],
+            spp: Count { asked: 26, taken: 28 },
+            replicate: 3,
+            seed,
+            estimator: Estimator::Unbiased,
+            stage: Stage::Final,
+            size: Size { width: 80, height: 45 },
+            mean: 0.25,
+            pixels: "ffff".to_owned(),
+            errors: Some(ImageErrors {
+                reference_id: "fedcba9876543210".to_owned(),
+                metrics_algorithm: 1,
+                mse,
+                mse_unbiased: -1e-9,
+                rel_mse: 0.0,
+                mae: 5e-324,
+                bias: -0.0,
+                error_autocorrelation: None,
+            }),
+        })
+    }
+
+    #[test]
+    fn a_row_reads_back_bit_for_bit() {
+        for (seed, mse) in [(0, 0.1 + 0.2), (u64::MAX, f64::MAX), (1 << 53 | 1, f64::MIN_POSITIVE)] {
+            let row = row(seed, mse);
+            let line = row.to_line();
+            let again = Row::parse(&line).unwrap();
+            assert_eq!(again, row);
+            assert_eq!(again.to_line(), line);
+        }
+    }
+
+    #[test]
+    fn a_row_starts_with_schema_id_and_kind_and_holds_its_errors_flat() {
+        let line = row(u64::MAX, 0.5).to_line();
+        assert!(line.starts_with(r#"{"schema":1,"id":"0123456789abcdef","kind":"render","scene":"a01","#), "{line}");
+        assert!(
+            line.contains(r#""spp":{"asked":26,"taken":28},"replicate":3,"seed":"18446744073709551615""#),
+            "{line}"
+        );
+        assert!(line.contains(r#""mse":0.5,"#) && line.ends_with(r#""error_autocorrelation":null}"#), "{line}");
+    }
+
+    #[test]
+    fn a_render_row_without_errors_is_refused() {
+        let line = row(1, 0.5).to_line().replace("\"mse_unbiased\"", "\"mse_unbaised\"");
+        assert!(Row::parse(&line).unwrap_err().contains("image errors"));
+    }
+
+    #[test]
+    fn another_schema_is_refused_with_its_number() {
+        let line = row(1, 0.5).to_line().replace("\"schema\":1", "\"schema\":2");
+        assert!(Row::parse(&line).unwrap_err().contains("found schema 2"));
+    }
+
+    #[test]
+    fn only_a_torn_last_line_is_forgiven() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("results.jsonl");
+        let (a, b) = (row(1, 0.5), row(2, 0.25));
+        let whole = format!("{}\n{}\n", a.to_line(), b.to_line());
+        let first = a.to_line().len() + 1;
+        for end in 0..=whole.len() {
+            std::fs::write(&path, &whole[..end]).unwrap();
+            let expected = usize::from(end >= first - 1) + usize::from(end >= whole.len() - 1);
+            assert_eq!(read(&path).unwrap().len(), expected, "cut at {end}");
+        }
+        std::fs::write(&path, format!("{}\n{{\"schema\":1,\n{}\n", a.to_line(), b.to_line())).unwrap();
+        let error = read(&path).unwrap_err();
+        assert!(error.exit_code() == 2 && error.place.ends_with("results.jsonl:2"), "{error}");
+    }
+
+    #[test]
+    fn a_torn_letter_of_several_bytes_is_only_a_torn_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("results.jsonl");
+        std::fs::write(&path, b"{\"schema\":1,\"id\":\"\xc3").unwrap();
+        assert_eq!(read(&path).unwrap(), []);
+    }
+}

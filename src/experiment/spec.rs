@@ -1,0 +1,377 @@
+//! An experiment as a file says it: which scenes, under which samplers, how often, compared with what.
+//!
+//! Strict like a scene file: unknown keys, wrong types, empty or repeated entries are errors that name the place. All
+//! keys but those marked optional are needed.
+//!
+//! | key | meaning |
+//! |---|---|
+//! | `name` | folder name of the results; letters, digits, `.`, `-`, `_`, not beginning with `.` |
+//! | `seed` | whole number of 64 bits; every randomisation is derived from it |
+//! | `scenes` | names of scene files in `configs/`, or paths that end in `.json` |
+//! | `size` | optional: `"WxH"` for all scenes, or `{"SCENE": "WxH"}`; a scene not named keeps its file's own |
+//! | `samplers` | texts `POINTS[:ORDER[:RANDOM[@SCOPE]]]` or `POINTS:PRESET`; a bare name means `:best` |
+//! | `spp` | samples per pixel, each 1 to 2^24 |
+//! | `replicates` | independent randomisations of each image; 1 is used where nothing is random |
+//! | `reference` | `{"sampler", "spp"}`: two independent halves of `spp` samples per pixel, by a randomised sampler that is not compared |
+//! | `estimator` | optional: `"unbiased"` (the default) or `"sheet"`; references are always unbiased |
+//! | `points` | optional: `{"n", "metrics", "replicates"}`: point-set metrics of the same samplers |
+//! | `pictures` | optional: `{"scene", "size", "spp", "reference_spp"}`: images to look at; `reference_spp` defaults to the reference's |
+
+use std::collections::HashSet;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::backend::{Estimator, Size};
+use crate::error::{Error, Result};
+use crate::scene::json::{self, Item, Value, suggestion};
+
+/// Most samples per pixel.
+pub const MOST_SPP: u32 = 1 << 24;
+
+/// Most points of a set in an experiment: the exact star discrepancy takes time n².
+pub const MOST_POINTS: u32 = 1 << 16;
+
+/// Most replicates.
+pub const MOST_REPLICATES: u32 = 10_000;
+
+/// An experiment, all defaults made explicit.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Experiment {
+    /// Folder name of the results.
+    pub name: String,
+    /// Where every randomisation comes from.
+    pub seed: u64,
+    /// Scene names or paths, as written.
+    pub scenes: Vec<String>,
+    /// Image sizes.
+    pub size: Sizes,
+    /// Samplers, as written.
+    pub samplers: Vec<String>,
+    /// Samples per pixel.
+    pub spp: Vec<u32>,
+    /// Independent randomisations of each image.
+    pub replicates: u32,
+    /// What images are compared with.
+    pub reference: Reference,
+    /// Light estimator of the compared images.
+    pub estimator: Estimator,
+    /// Point-set metrics.
+    pub points: Option<Points>,
+    /// Images to look at.
+    pub pictures: Option<Pictures>,
+    /// The file, for messages; no part of the experiment.
+    #[serde(skip)]
+    pub place: String,
+}
+
+/// Image sizes of an experiment's scenes.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Sizes {
+    /// One size for all scenes.
+    All(Size),
+    /// A size for each scene named; the others keep their file's own.
+    PerScene(Vec<(String, Size)>),
+}
+
+impl Sizes {
+    /// The size for a scene as the experiment names it, where `own` is what its file asks for.
+    pub fn of(&self, scene: &str, own: Size) -> Size {
+        match self {
+            Self::All(size) => *size,
+            Self::PerScene(sizes) => sizes.iter().find(|(name, _)| name == scene).map_or(own, |(_, size)| *size),
+        }
+    }
+}
+
+/// What images are compared with: two independent halves.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Reference {
+    /// Sampler, as written; randomised, and none of those compared.
+    pub sampler: String,
+    /// Samples per pixel of each half.
+    pub spp: u32,
+}
+
+/// Point-set metrics to compute.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Points {
+    /// Sizes of the sets.
+    pub n: Vec<u32>,
+    /// Names of the metrics.
+    pub metrics: Vec<String>,
+    /// Independent randomisations of each set; 1 is used where nothing is random.
+    pub replicates: u32,
+}
+
+/// Larger images, one of each sampler.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Pictures {
+    /// Scene, one of the experiment's.
+    pub scene: String,
+    /// Image size.
+    pub size: Size,
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Samples per pixel of each half of the pictures' own reference.
+    pub reference_spp: u32,
+}
+
+impl Experiment {
+    /// Reads an experiment file.
+    ///
+    /// # Errors
+    /// Kind `Input` that names file and key, what was expected and what was found.
+    pub fn read(path: &Path) -> Result<Self> {
+        Self::from_value(&json::read_file(path)?, &path.display().to_string())
+    }
+
+    /// Reads an experiment from JSON; `place` names it in messages.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn from_value(value: &Value, place: &str) -> Result<Self> {
+        let mut fields = Item::top(value, place).fields()?;
+        let name = fields.need("name", name)?;
+        let seed = fields.need("seed", |item| item.integer(0..=u64::MAX))?;
+        let scenes = fields.need("scenes", |item| texts(&item, "scene names"))?;
+        let size = fields.or("size", Sizes::PerScene(Vec::new()), |item| sizes(&item, &scenes))?;
+        let samplers = fields.need("samplers", |item| texts(&item, "samplers"))?;
+        let spp = fields.need("spp", |item| counts(&item, MOST_SPP))?;
+        let replicates = fields.need("replicates", |item| count(&item, MOST_REPLICATES))?;
+        let reference = fields.need("reference", |item| reference(&item))?;
+        let estimators = [("unbiased", Estimator::Unbiased), ("sheet", Estimator::Sheet)];
+        let estimator = fields.or("estimator", Estimator::Unbiased, |item| item.choice(&estimators))?;
+        let points = fields.opt("points", |item| points(&item))?;
+        let pictures = fields.opt("pictures", |item| pictures(&item, &scenes, reference.spp))?;
+        fields.finish()?;
+        Ok(Self {
+            name,
+            seed,
+            scenes,
+            size,
+            samplers,
+            spp,
+            replicates,
+            reference,
+            estimator,
+            points,
+            pictures,
+            place: place.to_owned(),
+        })
+    }
+}
+
+/// A folder name that means the same on every system.
+fn name(item: Item) -> Result<String> {
+    let expected = "a name of 1 to 64 letters, digits, '.', '-' and '_' that does not begin with '.'";
+    let name = item.text(expected)?;
+    let plain = name.bytes().all(|b| b.is_ascii_alphanumeric() || b".-_".contains(&b));
+    if plain && !name.starts_with('.') && (1..=64).contains(&name.len()) {
+        Ok(name.to_owned())
+    } else {
+        Err(item.unexpected(expected))
+    }
+}
+
+/// A list of at least one entry, each once.
+fn list<'a, T: std::hash::Hash + Eq + Clone>(
+    item: &Item<'a>,
+    what: &str,
+    read: impl Fn(&Item<'a>) -> Result<T>,
+) -> Result<Vec<T>> {
+    let expected = format!("a list of {what}, at least one, each once");
+    let items = item.items(&expected)?;
+    if items.is_empty() {
+        return Err(item.unexpected(expected));
+    }
+    let mut seen = HashSet::new();
+    items
+        .iter()
+        .map(|item| {
+            let value = read(item)?;
+            if seen.insert(value.clone()) { Ok(value) } else { Err(repeated(item)) }
+        })
+        .collect()
+}
+
+/// The error about an entry that stands twice in its list.
+fn repeated(item: &Item) -> Error {
+    Error::input(&item.place, format!("expected each entry once, found {} again", item.value))
+}
+
+/// A list of names.
+fn texts(item: &Item, what: &str) -> Result<Vec<String>> {
+    list(item, what, |item| match item.text("a text")? {
+        "" => Err(item.unexpected("a text that is not empty")),
+        text => Ok(text.to_owned()),
+    })
+}
+
+/// A number of things, at least 1.
+fn count(item: &Item, most: u32) -> Result<u32> {
+    // `integer` keeps to the range, so nothing is cut off.
+    item.integer(1..=u64::from(most)).map(|n| n as u32)
+}
+
+/// A list of numbers of things.
+fn counts(item: &Item, most: u32) -> Result<Vec<u32>> {
+    list(item, "whole numbers", |item| count(item, most))
+}
+
+/// `"WxH"`.
+fn size(item: &Item) -> Result<Size> {
+    let text = item.text("a size such as \"320x180\"")?;
+    Size::parse(text).map_err(|what| Error::input(&item.place, what))
+}
+
+/// `"WxH"` or `{"SCENE": "WxH"}`.
+fn sizes(item: &Item, scenes: &[String]) -> Result<Sizes> {
+    match item.value {
+        Value::Text(_) => size(item).map(Sizes::All),
+        Value::Object(pairs) => {
+            let one = |(scene, value): &(String, Value)| {
+                let item = Item { value, place: item.place.key(scene) };
+                known_scene(scene, scenes, &item)?;
+                Ok((scene.clone(), size(&item)?))
+            };
+            pairs.iter().map(one).collect::<Result<_>>().map(Sizes::PerScene)
+        }
+        _ => Err(item.unexpected("a size such as \"320x180\", or an object of one for each scene")),
+    }
+}
+
+/// A scene has to be one of the experiment's.
+fn known_scene(scene: &str, scenes: &[String], item: &Item) -> Result<()> {
+    if scenes.iter().any(|known| known == scene) {
+        return Ok(());
+    }
+    let near = suggestion(scene, scenes.iter().map(String::as_str));
+    Err(Error::input(&item.place, format!("expected one of the scenes {}, found {scene:?}{near}", scenes.join(" "))))
+}
+
+/// `reference`.
+fn reference(item: &Item) -> Result<Reference> {
+    let mut fields = item.fields()?;
+    let sampler = fields.need("sampler", |item| item.text("a sampler").map(str::to_owned))?;
+    let spp = fields.need("spp", |item| count(&item, MOST_SPP))?;
+    fields.finish()?;
+    Ok(Reference { sampler, spp })
+}
+
+/// `points`.
+fn points(item: &Item) -> Result<Points> {
+    let mut fields = item.fields()?;
+    let n = fields.need("n", |item| counts(&item, MOST_POINTS))?;
+    let metrics = fields.need("metrics", |item| texts(&item, "metrics"))?;
+    let replicates = fields.need("replicates", |item| count(&item, MOST_REPLICATES))?;
+    fields.finish()?;
+    Ok(Points { n, metrics, replicates })
+}
+
+/// `pictures`.
+fn pictures(item: &Item, scenes: &[String], reference_spp: u32) -> Result<Pictures> {
+    let mut fields = item.fields()?;
+    let scene = fields.need("scene", |item| {
+        let scene = item.text("a scene of the experiment")?;
+        known_scene(scene, scenes, &item)?;
+        Ok(scene.to_owned())
+    })?;
+    let size = fields.need("size", |item| size(&item))?;
+    let spp = fields.need("spp", |item| count(&item, MOST_SPP))?;
+    let reference_spp = fields.or("reference_spp", reference_spp, |item| count(&item, MOST_SPP))?;
+    fields.finish()?;
+    Ok(Pictures { scene, size, spp, reference_spp })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SMALL: &str = r#"{
+        "name": "small", "seed": 18446744073709551615, "scenes": ["pots", "box"], "size": {"box": "6x4"},
+        "samplers": ["uniform", "ld:sheet"], "spp": [1, 4], "replicates": 3,
+        "reference": {"sampler": "sobol", "spp": 64},
+        "points": {"n": [2, 4], "metrics": ["star"], "replicates": 2},
+        "pictures": {"scene": "pots", "size": "8x4", "spp": 2}
+    }"#;
+
+    fn read(text: &str) -> Result<Experiment> {
+        Experiment::from_value(&json::parse(text.as_bytes(), "small.json")?, "small.json")
+    }
+
+    #[test]
+    fn an_experiment_reads_with_its_defaults_made_explicit() {
+        let experiment = read(SMALL).unwrap();
+        assert_eq!(experiment.seed, u64::MAX);
+        assert_eq!(experiment.estimator, Estimator::Unbiased);
+        assert_eq!(experiment.pictures.as_ref().unwrap().reference_spp, 64);
+        let own = Size { width: 9, height: 9 };
+        assert_eq!(experiment.size.of("box", own), Size { width: 6, height: 4 });
+        assert_eq!(experiment.size.of("pots", own), own);
+    }
+
+    #[test]
+    fn what_is_recorded_of_an_experiment_reads_back_equal() {
+        let experiment = Experiment { place: String::new(), ..read(SMALL).unwrap() };
+        let text = serde_json::to_string(&experiment).unwrap();
+        assert_eq!(serde_json::from_str::<Experiment>(&text).unwrap(), experiment);
+    }
+
+    /// Each edit of a good file, and what the message has to say of it.
+    const BAD: [(&str, &str, &str); 27] = [
+        ("\"seed\"", "\"sede\"", "expected the key \"seed\""),
+        ("\"points\"", "\"pionts\"", "pionts: expected one of the keys"),
+        ("\"points\"", "\"pionts\"", "did you mean \"points\"?"),
+        ("\"spp\": 2}", "\"sppx\": 2}", "pictures: expected the key \"spp\""),
+        ("\"small\"", "\"../small\"", "name: expected a name of"),
+        ("\"small\"", "\".small\"", "name: expected a name of"),
+        ("\"small\"", "\"\"", "name: expected a name of"),
+        ("18446744073709551615", "-1", "seed: expected a whole number"),
+        ("18446744073709551615", "1.5", "seed: expected a whole number"),
+        ("[\"pots\", \"box\"]", "[]", "scenes: expected a list of scene names, at least one, each once, found []"),
+        (
+            "[\"pots\", \"box\"]",
+            "[\"pots\", \"box\", \"pots\"]",
+            "scenes[2]: expected each entry once, found \"pots\" again",
+        ),
+        ("[\"pots\", \"box\"]", "\"pots\"", "scenes: expected a list"),
+        ("{\"box\": \"6x4\"}", "{\"bxo\": \"6x4\"}", "size.bxo: expected one of the scenes pots box"),
+        ("\"6x4\"", "\"6x0\"", "size.box: expected a size such as"),
+        ("\"6x4\"", "64", "size.box: expected a size such as"),
+        ("{\"box\": \"6x4\"}", "12", "size: expected a size such as"),
+        ("\"ld:sheet\"", "{\"name\": \"x\"}", "samplers[1]: expected a text, found {\"name\": \"x\"}"),
+        ("\"ld:sheet\"", "\"uniform\"", "samplers[1]: expected each entry once"),
+        ("\"ld:sheet\"", "\"\"", "samplers[1]: expected a text that is not empty"),
+        ("[1, 4]", "[1, 0]", "spp[1]: expected a whole number from 1 to 16777216, found 0"),
+        ("[1, 4]", "[16777217]", "spp[0]: expected a whole number from 1 to 16777216"),
+        ("[1, 4]", "[4, 4.0]", "spp[1]: expected each entry once"),
+        ("\"replicates\": 3", "\"replicates\": 0", "replicates: expected a whole number from 1"),
+        ("\"spp\": 64}", "\"spp\": 0}", "reference.spp: expected a whole number"),
+        ("\"seed\": ", "\"estimator\": \"sheat\", \"seed\": ", "estimator: expected \"unbiased\" or \"sheet\""),
+        (
+            "\"scene\": \"pots\"",
+            "\"scene\": \"pot\"",
+            "pictures.scene: expected one of the scenes pots box, found \"pot\"; did you mean",
+        ),
+        ("[2, 4]", "[65537]", "points.n[0]: expected a whole number from 1 to 65536"),
+    ];
+
+    #[test]
+    fn every_bad_entry_is_an_error_that_names_its_place() {
+        for (good, bad, expected) in BAD {
+            let text = SMALL.replacen(good, bad, 1);
+            assert_ne!(text, SMALL, "{good}");
+            let error = read(&text).unwrap_err();
+            assert_eq!(error.exit_code(), 2);
+            let message = error.to_string();
+            assert!(message.starts_with("small.json") && message.contains(expected), "{message} ({expected})");
+        }
+    }
+
+    #[test]
+    fn a_missing_file_is_bad_input() {
+        assert_eq!(Experiment::read(Path::new("no/such/experiment.json")).unwrap_err().exit_code(), 2);
+    }
+}

@@ -1,0 +1,263 @@
+//! What is done, what is left, and what that will cost: read from an output folder without changing it.
+
+use std::collections::{HashMap, HashSet};
+use std::fmt;
+use std::path::Path;
+
+use super::backend::Size;
+use super::images;
+use super::plan::{Plan, Work, WorkItem};
+use super::results::{self, Kind, Row, Timing};
+use crate::error::{Error, Result};
+
+/// Samples per second and thread that are expected where nothing was timed yet.
+pub const STATED_RATE: f64 = 2e6;
+
+/// Pairs of points per second for point-set metrics.
+const PAIR_RATE: f64 = 2e8;
+
+/// Bytes of an image: three `f32` a pixel.
+const BYTES_A_PIXEL: u64 = 12;
+
+/// Bytes of work beside the images held: f64 sums of a film and of an ensemble.
+const WORK_BYTES_A_PIXEL: u64 = 64;
+
+/// Bytes on disk beside the pixels: header of an EXR, lines of rows and timings.
+const BYTES_AN_ITEM: u64 = 3 << 10;
+
+/// How far an item is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum State {
+    /// Row and, where it is shown, image are there.
+    Done,
+    /// The row is there; the image, which a report shows, is not.
+    ImageMissing,
+    /// No row, or one that was measured another way.
+    Missing,
+}
+
+/// What an output folder holds of a plan.
+#[derive(Debug)]
+pub struct Standing {
+    /// Rows by id, those of other plans among them.
+    pub rows: HashMap<String, Row>,
+    /// All rows in the order of the file.
+    pub(super) in_file: Vec<Row>,
+    /// Timings by id; the last of an item counts.
+    pub timings: HashMap<String, Timing>,
+    /// State of each of the plan's items.
+    pub states: Vec<State>,
+    /// Whether both files are exactly their whole lines.
+    pub(super) is_clean: bool,
+}
+
+impl Standing {
+    /// Reads an output folder; one that is not there has nothing done.
+    ///
+    /// # Errors
+    /// Kind `Input` where a line other than a torn last one does not read.
+    pub fn read(plan: &Plan, out: &Path) -> Result<Self> {
+        let (in_file, rows_clean) = results::lines_if_any(&results::results_path(out), Row::parse)?;
+        let (timings, timings_clean) = results::lines_if_any(&results::timings_path(out), results::parse_timing)?;
+        let rows: HashMap<String, Row> = in_file.iter().map(|row| (row.id().to_owned(), row.clone())).collect();
+        let states = plan.items.iter().map(|item| state(item, rows.get(&item.id), out)).collect();
+        let timings = timings.into_iter().map(|timing| (timing.id.clone(), timing)).collect();
+        Ok(Self { rows, in_file, timings, states, is_clean: rows_clean && timings_clean })
+    }
+}
+
+/// The state of one item.
+fn state(item: &WorkItem, row: Option<&Row>, out: &Path) -> State {
+    let Some(row) = row.filter(|row| is_result_of(row, item)) else { return State::Missing };
+    match item.kept_image() {
+        Some(size) if item.is_shown && images::stored(out, &item.id, size, row.kept_pixels()).is_none() => {
+            State::ImageMissing
+        }
+        _ => State::Done,
+    }
+}
+
+/// Whether a row holds what the item would find: the id vouches for the pixels, the rest is compared here.
+fn is_result_of(row: &Row, item: &WorkItem) -> bool {
+    let metrics = item.metrics_algorithm;
+    match (row, &item.work) {
+        (Row::Image(row), Work::Image(work)) => {
+            let errors = row.errors.as_ref();
+            row.kind == work.kind
+                && errors.map(|errors| &errors.reference_id) == work.reference_id.as_ref()
+                && errors.is_none_or(|errors| errors.metrics_algorithm == metrics)
+        }
+        (Row::Reference(row), Work::Reference(_)) => row.metrics_algorithm == metrics,
+        (Row::Ensemble(row), Work::Ensemble(_)) => row.metrics_algorithm == metrics,
+        (Row::Points(row), Work::Points(_)) => row.metrics_algorithm == metrics,
+        _ => false,
+    }
+}
+
+/// What a plan costs from where it stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Survey {
+    /// Items by kind: all, and those left.
+    pub items: Vec<(Kind, usize, usize)>,
+    /// Samples of the whole plan.
+    pub samples: u64,
+    /// Samples left to render.
+    pub samples_left: u64,
+    /// Samples per second expected with the threads given.
+    pub rate: f64,
+    /// Whether the rate comes from the folder's own timings.
+    pub is_rate_measured: bool,
+    /// Seconds expected for what is left.
+    pub seconds_left: f64,
+    /// Bytes held at the most, scenes among them.
+    pub memory_bytes: u64,
+    /// Bytes on disk at the end, before compression.
+    pub disk_bytes: u64,
+}
+
+impl Survey {
+    /// Surveys a plan; `threads` will work on it.
+    pub fn new(plan: &Plan, standing: &Standing, out: &Path, threads: usize) -> Self {
+        let left: Vec<usize> =
+            (0..plan.items.len()).filter(|&position| standing.states[position] != State::Done).collect();
+        let samples_left = samples_left(plan, standing, out, &left);
+        let (rate, is_rate_measured) = rate(standing, threads);
+        let pairs: u64 = left.iter().map(|&position| plan.items[position].pairs()).sum();
+        let kept: Vec<Size> = plan.items.iter().filter_map(WorkItem::kept_image).collect();
+        Self {
+            items: count_kinds(plan, &left),
+            samples: plan.items.iter().map(WorkItem::samples).sum(),
+            samples_left,
+            rate,
+            is_rate_measured,
+            seconds_left: samples_left as f64 / rate + pairs as f64 / PAIR_RATE,
+            memory_bytes: memory_bytes(plan),
+            disk_bytes: kept.iter().map(|size| size.pixels() * BYTES_A_PIXEL).sum::<u64>()
+                + plan.items.len() as u64 * BYTES_AN_ITEM,
+        }
+    }
+
+    /// Refuses a plan that needs more than it may have.
+    ///
+    /// # Errors
+    /// Kind `Input` with what is needed and what is allowed.
+    pub fn refuse_above(&self, limits: &Limits, place: &str) -> Result<()> {
+        let needs = [("memory", self.memory_bytes, limits.memory_bytes), ("disk", self.disk_bytes, limits.disk_bytes)];
+        for (what, needed, allowed) in needs {
+            if needed > allowed {
+                let (needed, allowed) = (bytes(needed), bytes(allowed));
+                let what = format!(
+                    "expected to need at most {allowed} of {what}, found a need of {needed}; lower size or replicates"
+                );
+                return Err(Error::input(place, what));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What a run may use; more is refused before it starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Bytes of memory.
+    pub memory_bytes: u64,
+    /// Bytes of disk.
+    pub disk_bytes: u64,
+}
+
+impl Default for Limits {
+    /// 4 GiB of memory, 16 GiB of disk.
+    fn default() -> Self {
+        Self { memory_bytes: 4 << 30, disk_bytes: 16 << 30 }
+    }
+}
+
+/// Items by kind, in the order in which kinds first occur.
+fn count_kinds(plan: &Plan, left: &[usize]) -> Vec<(Kind, usize, usize)> {
+    let left: HashSet<usize> = left.iter().copied().collect();
+    let mut counts: Vec<(Kind, usize, usize)> = Vec::new();
+    for (position, item) in plan.items.iter().enumerate() {
+        let missing = usize::from(left.contains(&position));
+        match counts.iter_mut().find(|(kind, ..)| *kind == item.kind()) {
+            Some((_, all, of_them)) => {
+                *all += 1;
+                *of_them += missing;
+            }
+            None => counts.push((item.kind(), 1, missing)),
+        }
+    }
+    counts
+}
+
+/// Samples of the images that items left need and that are not on disk; a file that turns out torn costs more.
+fn samples_left(plan: &Plan, standing: &Standing, out: &Path, left: &[usize]) -> u64 {
+    let needed: HashSet<&str> = left
+        .iter()
+        .flat_map(|&position| match standing.states[position] {
+            State::ImageMissing => vec![plan.items[position].id.as_str()],
+            _ => plan.images_needed(position),
+        })
+        .collect();
+    let is_there = |id: &str| standing.timings.contains_key(id) && results::image_path(out, id).exists();
+    let to_render = needed.into_iter().filter(|id| !is_there(id)).filter_map(|id| plan.position(id));
+    to_render.map(|position| plan.items[position].samples()).sum()
+}
+
+/// Samples per second with so many threads, from the timings where there are any.
+fn rate(standing: &Standing, threads: usize) -> (f64, bool) {
+    let samples: u64 = standing.timings.values().map(|timing| timing.samples).sum();
+    let thread_seconds: f64 = standing.timings.values().map(|timing| timing.seconds * timing.threads as f64).sum();
+    let measured = samples as f64 / thread_seconds;
+    let is_measured = samples > 0 && measured.is_finite() && measured > 0.0;
+    (if is_measured { measured } else { STATED_RATE } * threads.max(1) as f64, is_measured)
+}
+
+/// Bytes at the busiest moment: the images held then, work beside the largest, and all scenes.
+fn memory_bytes(plan: &Plan) -> u64 {
+    let pixels = |id: &str| plan.position(id).and_then(|at| plan.items[at].kept_image()).map_or(0, Size::pixels);
+    let released = plan.released_after();
+    let mut held: HashSet<String> = HashSet::new();
+    let (mut held_pixels, mut most_pixels) = (0, 0);
+    for (position, gone) in released.iter().enumerate() {
+        for id in plan.images_needed(position) {
+            if held.insert(id.to_owned()) {
+                held_pixels += pixels(id);
+            }
+        }
+        most_pixels = most_pixels.max(held_pixels);
+        for id in gone {
+            held.remove(id);
+            held_pixels -= pixels(id);
+        }
+    }
+    let largest = plan.items.iter().filter_map(WorkItem::kept_image).map(Size::pixels).max().unwrap_or(0);
+    let scenes: u64 = plan.scenes.iter().map(|scene| scene.memory_bytes).sum();
+    most_pixels * BYTES_A_PIXEL + largest * WORK_BYTES_A_PIXEL + scenes
+}
+
+/// Bytes for a reader.
+fn bytes(n: u64) -> String {
+    match n {
+        0..1_000_000 => format!("{:.1} kB", n as f64 / 1e3),
+        1_000_000..1_000_000_000 => format!("{:.1} MB", n as f64 / 1e6),
+        _ => format!("{:.1} GB", n as f64 / 1e9),
+    }
+}
+
+impl fmt::Display for Survey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (kind, all, left) in &self.items {
+            writeln!(f, "{:<15}{all:>7} items, {left} to do", results::kind_name(*kind))?;
+        }
+        writeln!(
+            f,
+            "samples        {:>10.1} M, {:.1} M to render",
+            self.samples as f64 / 1e6,
+            self.samples_left as f64 / 1e6
+        )?;
+        let source = if self.is_rate_measured { "measured here" } else { "stated, nothing timed yet" };
+        writeln!(f, "time           {:>10.1} s at {:.2} M samples/s ({source})", self.seconds_left, self.rate / 1e6)?;
+        writeln!(f, "memory         {:>12} at most", bytes(self.memory_bytes))?;
+        write!(f, "disk           {:>12} at most", bytes(self.disk_bytes))
+    }
+}

@@ -1,0 +1,792 @@
+//! Experiments from end to end, on a backend small enough to look through: plans stay put, kills leave no trace, the
+//! thread count is nowhere in the results, and whatever is wrong with a file or a folder is said.
+
+use std::cell::{Cell, RefCell};
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use sampler_lab::error::{Error, Result};
+use sampler_lab::experiment::backend::{Algorithms, Backend, PointMetrics, RenderRequest, SceneFacts, Size, Stage};
+use sampler_lab::experiment::execute::{Options, Outcome, execute};
+use sampler_lab::experiment::plan::{Plan, Work, plan, refuse_equal_seeds};
+use sampler_lab::experiment::progress::{Progress, Silent, Tick};
+use sampler_lab::experiment::results::{self, Kind, Row};
+use sampler_lab::experiment::spec::Experiment;
+use sampler_lab::experiment::survey::{Limits, Standing, State, Survey};
+use sampler_lab::film::{Image, read_exr};
+use sampler_lab::scene::json;
+
+/// A backend whose image is a ramp plus noise of variance 1/spp, so errors behave like errors.
+struct Toy {
+    content: &'static str,
+    numbers: Algorithms,
+    /// Every render asked for: scene, sampler, spp, seed.
+    rendered: RefCell<Vec<(String, String, u32, u64)>>,
+    /// Renders of this sampler and spp fail.
+    broken: Option<(&'static str, u32)>,
+    /// Added to every pixel: code whose bits changed.
+    drift: Cell<f32>,
+}
+
+impl Toy {
+    fn new() -> Self {
+        Self {
+            content: "",
+            numbers: Algorithms { renderer: 1, sampler: 1, estimator: 1, exact: 1, metrics: 1 },
+            rendered: RefCell::default(),
+            broken: None,
+            drift: Cell::new(0.0),
+        }
+    }
+
+    fn renders(&self) -> usize {
+        self.rendered.borrow().len()
+    }
+}
+
+/// SplitMix64 (Steele, Lea & Flood 2014), one step.
+fn mix(x: u64) -> u64 {
+    let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
+/// What the toy's image would be with endless samples.
+fn truth(size: Size) -> Image {
+    let at = |i: u64| (i % u64::from(size.width)) as f32 / size.width as f32;
+    let pixels = (0..size.pixels()).map(|i| [at(i), 0.5, 1.0 - at(i)]).collect();
+    Image { width: size.width, height: size.height, pixels }
+}
+
+impl Backend for Toy {
+    fn open_scene(&self, scene: &str) -> Result<SceneFacts> {
+        if scene == "nowhere" {
+            return Err(Error::input(scene, "expected a scene file, found none"));
+        }
+        let name = Path::new(scene).file_stem().unwrap().to_str().unwrap();
+        Ok(SceneFacts {
+            name: name.to_owned(),
+            content_hash: format!("{name}{}", self.content),
+            size: Size { width: 5, height: 4 },
+            spp: 3,
+            layout: "pixel 0-1".to_owned(),
+            exact_reference: name == "exact",
+            lens: false,
+            memory_bytes: 1000,
+        })
+    }
+
+    fn parse_sampler(&self, text: &str) -> Result<String> {
+        let canonical = match text {
+            "fresh" | "fresh:sheet" | "fresh:best" => "fresh:step",
+            "grid" => "grid:none",
+            "strata" => "strata:jitter",
+            "net" => "net:owen",
+            "truth" => "truth:owen",
+            _ => return Err(Error::input(text, "expected one of the samplers fresh grid strata net truth")),
+        };
+        Ok(canonical.to_owned())
+    }
+
+    fn is_random(&self, canonical: &str, _: Option<&str>) -> bool {
+        canonical != "grid:none"
+    }
+
+    fn taken(&self, canonical: &str, _: Option<&str>, asked: u32) -> u32 {
+        if canonical.starts_with("strata") { asked.next_multiple_of(2) } else { asked }
+    }
+
+    fn algorithms(&self, _: &str) -> Algorithms {
+        self.numbers
+    }
+
+    fn prepare(&self, _: &RenderRequest) -> Result<()> {
+        Ok(())
+    }
+
+    fn render(&self, request: &RenderRequest) -> Result<Image> {
+        let &RenderRequest { scene, sampler, spp, seed, size, .. } = request;
+        assert!(request.threads > 0);
+        self.rendered.borrow_mut().push((scene.to_owned(), sampler.to_owned(), spp, seed));
+        if self.broken == Some((sampler, spp)) {
+            return Err(Error::incomplete(scene, "expected finite radiance, found NaN in pixel (1, 2), sample 3"));
+        }
+        let mut image = truth(size);
+        let seed = if sampler == "grid:none" { 7 } else { seed };
+        for (i, pixel) in image.pixels.iter_mut().enumerate() {
+            for (c, value) in pixel.iter_mut().enumerate() {
+                let random = mix(seed ^ mix(3 * i as u64 + c as u64)) as f64 / 2f64.powi(64) - 0.5;
+                *value += (random / f64::from(self.taken(sampler, None, spp)).sqrt()) as f32 + self.drift.get();
+            }
+        }
+        Ok(image)
+    }
+
+    fn exact_reference(&self, scene: &str, size: Size) -> Result<Image> {
+        self.rendered.borrow_mut().push((scene.to_owned(), "closed form".to_owned(), 0, 0));
+        Ok(truth(size))
+    }
+
+    fn point_metric_names(&self) -> &'static [&'static str] {
+        &["star", "t_value"]
+    }
+
+    fn point_metrics(&self, canonical: &str, n: u32, seed: u64, metrics: &[String]) -> Result<PointMetrics> {
+        let n = self.taken(canonical, None, n);
+        let value = |name: &String| (name == "star").then(|| (mix(seed) % 1000) as f64 / (1000.0 * f64::from(n)));
+        Ok(metrics.iter().map(|name| (name.clone(), value(name))).collect())
+    }
+}
+
+const SMALL: &str = r#"{
+    "name": "small", "seed": 11, "scenes": ["ramp", "exact"], "size": {"exact": "4x4"},
+    "samplers": ["fresh:sheet", "grid", "strata", "fresh:best"], "spp": [1, 4], "replicates": 3,
+    "reference": {"sampler": "truth", "spp": 64},
+    "points": {"n": [1, 2, 4], "metrics": ["star", "t_value"], "replicates": 2},
+    "pictures": {"scene": "ramp", "size": "8x4", "spp": 2, "reference_spp": 16}
+}"#;
+
+fn experiment(text: &str) -> Experiment {
+    Experiment::from_value(&json::parse(text.as_bytes(), "small.json").unwrap(), "small.json").unwrap()
+}
+
+fn edited(from: &str, to: &str) -> Experiment {
+    let text = SMALL.replacen(from, to, 1);
+    assert_ne!(text, SMALL, "{from}");
+    experiment(&text)
+}
+
+fn small(toy: &Toy) -> Plan {
+    plan(&experiment(SMALL), toy).unwrap()
+}
+
+fn options() -> Options<'static> {
+    Options::new(2, "sampler-lab run small.json")
+}
+
+fn run(plan: &Plan, toy: &Toy, out: &Path) -> Outcome {
+    execute(plan, toy, out, &Silent, &options()).unwrap()
+}
+
+fn rows(out: &Path) -> Vec<Row> {
+    results::read(&results::results_path(out)).unwrap()
+}
+
+/// Everything that may not depend on how a run went: every file but the timings, by name. Of images the pixels, bit for
+/// bit, and the provenance in order: the order of an EXR's attributes is its library's.
+fn bytes(out: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    for folder in [out.to_owned(), out.join("images")] {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+            if name.ends_with(".exr") {
+                let (image, provenance) = read_exr(&path).unwrap();
+                let pixels: Vec<[u32; 3]> = image.pixels.iter().map(|pixel| pixel.map(f32::to_bits)).collect();
+                files.insert(name, format!("{provenance:?} {} {pixels:?}", image.width).into_bytes());
+            } else if path.is_file() && name != "timings.jsonl" && name != ".lock" {
+                files.insert(name, std::fs::read(&path).unwrap());
+            }
+        }
+    }
+    files
+}
+
+/// Equal files, or the names of those that differ.
+#[track_caller]
+fn assert_same(found: &BTreeMap<String, Vec<u8>>, expected: &BTreeMap<String, Vec<u8>>, what: impl std::fmt::Display) {
+    let names: HashSet<&String> = found.keys().chain(expected.keys()).collect();
+    let differ: Vec<_> = names.into_iter().filter(|name| found.get(*name) != expected.get(*name)).collect();
+    assert!(differ.is_empty(), "{what}: {differ:?}");
+}
+
+/// The folder of an undisturbed run.
+fn undisturbed() -> (tempfile::TempDir, BTreeMap<String, Vec<u8>>) {
+    let folder = tempfile::tempdir().unwrap();
+    let toy = Toy::new();
+    run(&small(&toy), &toy, folder.path()).check().unwrap();
+    let bytes = bytes(folder.path());
+    (folder, bytes)
+}
+
+/// (id, seed) of every item by its words.
+fn identities(plan: &Plan) -> HashMap<String, (String, Option<u64>)> {
+    plan.items.iter().map(|item| (item.label(), (item.id.clone(), item.seed()))).collect()
+}
+
+// --- files ---
+
+#[test]
+fn the_experiments_that_come_with_the_lab_read() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/experiments");
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let experiment = Experiment::read(&path).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(path.file_stem().unwrap().to_str(), Some(experiment.name.as_str()));
+    }
+}
+
+// --- plans ---
+
+#[test]
+fn a_plan_lists_every_item_once_and_deterministic_samplers_have_one_replicate() {
+    let plan = small(&Toy::new());
+    let count = |kind: Kind| plan.items.iter().filter(|item| item.kind() == kind).count();
+    // Samplers: fresh (two names), grid (nothing random), strata. Replicates of a scene and spp: 3 + 1 + 3.
+    assert_eq!(plan.samplers.len(), 3);
+    assert_eq!(count(Kind::Points), 3 * (2 + 1 + 2));
+    assert_eq!(count(Kind::Render), 2 * 2 * (3 + 1 + 3));
+    assert_eq!(count(Kind::Ensemble), 2 * 2 * 3);
+    assert_eq!(count(Kind::ReferenceHalf), 2 + 2, "ramp and the pictures; exact has a closed form");
+    assert_eq!(count(Kind::Reference), 3);
+    assert_eq!(count(Kind::Picture), 3);
+    assert_eq!(count(Kind::Stage), 4);
+    let ids: HashSet<&str> = plan.items.iter().map(|item| item.id.as_str()).collect();
+    assert_eq!(ids.len(), plan.items.len());
+    let seeds: HashSet<u64> = plan.items.iter().filter_map(|item| item.seed()).collect();
+    assert_eq!(seeds.len(), plan.items.iter().filter(|item| item.seed().is_some()).count());
+}
+
+#[test]
+fn two_names_of_one_sampler_are_done_once_and_said() {
+    let plan = small(&Toy::new());
+    assert_eq!(plan.names("fresh:step"), ["fresh:sheet", "fresh:best"]);
+    assert!(
+        plan.notes.iter().any(|note| note.contains("fresh:sheet and fresh:best are one sampler")),
+        "{:?}",
+        plan.notes
+    );
+    assert!(plan.notes.iter().any(|note| note.contains("ramp, grid: nothing random")), "{:?}", plan.notes);
+    assert!(plan.notes.iter().any(|note| note == "ramp, strata: 1 spp asked, 2 taken"), "{:?}", plan.notes);
+}
+
+#[test]
+fn adding_a_sampler_a_scene_an_spp_or_replicates_changes_no_id_and_no_seed() {
+    let toy = Toy::new();
+    let before = identities(&small(&toy));
+    let edits = [
+        ("\"samplers\": [", "\"samplers\": [\"net\", "),
+        ("\"scenes\": [", "\"scenes\": [\"other\", "),
+        ("\"spp\": [1", "\"spp\": [16, 1"),
+        ("\"n\": [1", "\"n\": [8, 1"),
+        ("\"name\": \"small\"", "\"name\": \"renamed\""),
+    ];
+    for (from, to) in edits {
+        let after = identities(&plan(&edited(from, to), &toy).unwrap());
+        for (label, identity) in &before {
+            assert_eq!(after.get(label), Some(identity), "{to}: {label}");
+        }
+    }
+    // More replicates are more members: the ensembles are others, the images are not.
+    let after = identities(&plan(&edited("\"replicates\": 3", "\"replicates\": 5"), &toy).unwrap());
+    for (label, identity) in before.iter().filter(|(label, _)| !label.ends_with("ensemble") || label.contains("grid")) {
+        assert_eq!(after.get(label), Some(identity), "{label}");
+    }
+}
+
+#[test]
+fn another_reference_keeps_the_images_but_not_what_was_found_against_it() {
+    let toy = Toy::new();
+    let before = identities(&small(&toy));
+    let after = identities(&plan(&edited("\"spp\": 64", "\"spp\": 128"), &toy).unwrap());
+    for (label, identity) in &before {
+        let depends = label.starts_with("ramp") && (label.ends_with("ensemble") || label == "ramp 5x4 reference");
+        if let Some(other) = after.get(label) {
+            assert_eq!(other == identity, !depends, "{label}");
+        }
+    }
+}
+
+#[test]
+fn an_id_changes_with_content_and_algorithm_numbers_and_with_nothing_else() {
+    let base = Toy::new();
+    let before = small(&base);
+    let changed = |toy: &Toy| -> HashSet<Kind> {
+        let after = small(toy);
+        let pairs = before.items.iter().zip(&after.items);
+        pairs.filter(|(a, b)| a.id != b.id).map(|(a, _)| a.kind()).collect()
+    };
+    let numbers = base.numbers;
+    let with = |numbers| Toy { numbers, ..Toy::new() };
+    use Kind::*;
+    let images = HashSet::from([ReferenceHalf, Render, Picture, Stage, Reference, Ensemble]);
+    assert_eq!(changed(&base), HashSet::new());
+    assert_eq!(changed(&Toy { content: "edited", ..Toy::new() }), images);
+    assert_eq!(changed(&with(Algorithms { renderer: 2, ..numbers })), images);
+    assert_eq!(changed(&with(Algorithms { estimator: 2, ..numbers })), images);
+    let all: HashSet<Kind> = images.iter().copied().chain([Points]).collect();
+    assert_eq!(changed(&with(Algorithms { sampler: 2, ..numbers })), all);
+    assert_eq!(changed(&with(Algorithms { metrics: 2, ..numbers })), HashSet::from([Points, Ensemble]));
+    assert_eq!(changed(&with(Algorithms { exact: 2, ..numbers })), HashSet::from([Reference, Ensemble]));
+}
+
+/// Ids and seeds are what makes last year's rows this year's: should this test fail, all stored results are void.
+/// Both values were computed apart from this code, with Python's hashlib over the fields and their lengths.
+#[test]
+fn ids_and_seeds_are_the_ones_of_the_first_release() {
+    let plan = small(&Toy::new());
+    let render = plan.items.iter().find(|item| item.kind() == Kind::Render).unwrap();
+    assert_eq!(render.label(), "ramp fresh:step 1 spp 5x4 replicate 0");
+    assert_eq!((render.id.as_str(), render.seed()), ("755f99b895f282c6", Some(10_628_564_637_087_314_005)));
+}
+
+#[test]
+fn equal_seeds_are_refused_with_both_items_named() {
+    let mut plan = small(&Toy::new());
+    assert_eq!(refuse_equal_seeds(&plan.items, "small.json"), Ok(()));
+    let half = plan.items.iter().find(|item| item.kind() == Kind::ReferenceHalf).unwrap().seed().unwrap();
+    let render = plan.items.iter_mut().find(|item| item.kind() == Kind::Render).unwrap();
+    let Work::Image(work) = &mut render.work else { panic!("a render is an image") };
+    work.seed = half;
+    let error = refuse_equal_seeds(&plan.items, "small.json").unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    assert!(error.what.contains("reference half 0") && error.what.contains("replicate 0"), "{error}");
+}
+
+#[test]
+fn what_cannot_be_planned_is_refused_with_its_place() {
+    let cases = [
+        (
+            "\"sampler\": \"truth\"",
+            "\"sampler\": \"fresh\"",
+            "small.json: reference.sampler: expected a sampler that is not compared",
+        ),
+        ("\"grid\", ", "", "ok"),
+        ("\"grid\"", "\"gird\"", "small.json: samplers[1]: gird: expected one of the samplers"),
+        ("\"sampler\": \"truth\"", "\"sampler\": \"none\"", "small.json: reference.sampler: none: expected"),
+        (
+            "\"star\"",
+            "\"sta\"",
+            "small.json: points.metrics[0]: expected one of the metrics star t_value, found \"sta\"; did you mean \"star\"?",
+        ),
+        ("\"ramp\", \"exact\"", "\"ramp\", \"exact\", \"nowhere\"", "nowhere: expected a scene file"),
+        (
+            "\"ramp\", \"exact\"",
+            "\"ramp\", \"exact\", \"sub/ramp.json\"",
+            "small.json: scenes[2]: expected scenes of different names",
+        ),
+    ];
+    for (from, to, expected) in cases {
+        match plan(&edited(from, to), &Toy::new()) {
+            Ok(_) => assert_eq!(expected, "ok", "{to}"),
+            Err(error) => assert!(error.exit_code() == 2 && error.to_string().contains(expected), "{error}"),
+        }
+    }
+    let text = SMALL.replace("\"grid\", ", "").replace("\"sampler\": \"truth\"", "\"sampler\": \"grid\"");
+    let error = plan(&experiment(&text), &Toy::new()).unwrap_err();
+    assert!(error.what.contains("both halves of ramp would be one image"), "{error}");
+}
+
+// --- runs ---
+
+#[test]
+fn rows_are_in_plan_order_and_complete() {
+    let (folder, _) = undisturbed();
+    let plan = small(&Toy::new());
+    let rows = rows(folder.path());
+    assert!(rows.iter().map(Row::id).eq(plan.items.iter().map(|item| item.id.as_str())));
+    assert!(rows.iter().map(Row::kind).eq(plan.items.iter().map(|item| item.kind())));
+    for row in &rows {
+        match row {
+            Row::Ensemble(row) => {
+                let is_random = row.sampler != "grid:none";
+                assert_eq!(row.replicates, if is_random { 3 } else { 1 });
+                assert_eq!(row.variance.is_some(), is_random, "nothing random has no variance");
+            }
+            Row::Reference(row) => assert_eq!(row.noise_mse == 0.0, row.scene == "exact"),
+            Row::Image(row) if row.sampler == "fresh:step" => assert_eq!(row.names, ["fresh:sheet", "fresh:best"]),
+            Row::Image(_) | Row::Points(_) => {}
+        }
+    }
+    let about = results::read_about(&results::about_path(folder.path())).unwrap();
+    assert_eq!((about.experiment.name.as_str(), about.scenes.len()), ("small", 2));
+    assert_eq!(about.command, "sampler-lab run small.json");
+}
+
+/// The toy's noise is uniform on an interval of width 1/√n: its variance is 1/(12n) for n samples taken.
+///
+/// 60 or 48 channels × 3 replicates give a relative standard error of the variance near √(0.8/120) = 8 %; the bar at
+/// 45 % is beyond five of them for each of 8 ensembles: one false alarm in 10⁵ at a fixed seed.
+#[test]
+fn errors_are_those_of_the_images() {
+    let (folder, _) = undisturbed();
+    for row in rows(folder.path()) {
+        let Row::Ensemble(row) = row else { continue };
+        let Some(variance) = row.variance else { continue };
+        let exact = 1.0 / (12.0 * f64::from(row.spp.taken));
+        assert!((variance.value / exact - 1.0).abs() < 0.45, "{} {}: {variance:?}", row.sampler, row.spp.asked);
+        assert!((row.mse.value - row.bias2.value - variance.value * 2.0 / 3.0).abs() < 0.5 * exact, "{row:?}");
+    }
+}
+
+#[test]
+fn a_second_run_does_nothing_and_changes_nothing() {
+    let (folder, before) = undisturbed();
+    let toy = Toy::new();
+    let timings = std::fs::read(results::timings_path(folder.path())).unwrap();
+    let outcome = run(&small(&toy), &toy, folder.path());
+    assert_eq!((outcome.done, outcome.found, toy.renders()), (0, outcome.items, 0));
+    assert_same(&bytes(folder.path()), &before, "");
+    assert_eq!(std::fs::read(results::timings_path(folder.path())).unwrap(), timings);
+}
+
+#[test]
+fn a_run_killed_after_any_number_of_items_goes_on_to_the_same_bytes() {
+    let (_keep, expected) = undisturbed();
+    let items = small(&Toy::new()).items.len();
+    for step in [1, 7, items - 1] {
+        let folder = tempfile::tempdir().unwrap();
+        let toy = Toy::new();
+        let plan = small(&toy);
+        let mut runs = 0;
+        loop {
+            runs += 1;
+            let options = Options { at_most: Some(step), ..options() };
+            let outcome = execute(&plan, &toy, folder.path(), &Silent, &options).unwrap();
+            assert_eq!(outcome.check().is_err(), outcome.interrupted);
+            if !outcome.interrupted {
+                break;
+            }
+        }
+        assert_eq!(runs, items.div_ceil(step), "{step}");
+        assert_same(&bytes(folder.path()), &expected, format!("{step} items at a time"));
+        let distinct: HashSet<_> = toy.rendered.borrow().iter().cloned().collect();
+        assert_eq!(distinct.len(), toy.renders(), "an image was rendered twice");
+    }
+}
+
+#[test]
+fn rows_cut_at_any_byte_are_done_again_to_the_same_bytes() {
+    let (folder, expected) = undisturbed();
+    let path = results::results_path(folder.path());
+    let whole = std::fs::read(&path).unwrap();
+    let toy = Toy::new();
+    let plan = small(&toy);
+    // 60 places spread over the file, the ends among them, and each side of one line's end.
+    let line_end = whole.iter().position(|&byte| byte == b'\n').unwrap();
+    let places = (0..60u64).map(|i| (mix(i) % whole.len() as u64) as usize);
+    for end in places.chain([0, 1, line_end, line_end + 1, line_end + 2, whole.len() - 1]) {
+        std::fs::write(&path, &whole[..end]).unwrap();
+        run(&plan, &toy, folder.path()).check().unwrap();
+        assert_same(&bytes(folder.path()), &expected, format!("cut at {end}"));
+    }
+    assert_eq!(toy.renders(), 0, "the images were there");
+}
+
+#[test]
+fn timings_cut_at_any_byte_are_taken_again() {
+    let (folder, expected) = undisturbed();
+    let path = results::timings_path(folder.path());
+    let whole = std::fs::read(&path).unwrap();
+    let plan = small(&Toy::new());
+    for end in [0, 10, whole.len() / 2, whole.len() - 1] {
+        std::fs::write(&path, &whole[..end]).unwrap();
+        std::fs::write(results::results_path(folder.path()), "").unwrap();
+        run(&plan, &Toy::new(), folder.path()).check().unwrap();
+        assert_same(&bytes(folder.path()), &expected, format!("cut at {end}"));
+        let images = plan.items.iter().filter(|item| item.kept_image().is_some()).count();
+        assert_eq!(results::read_timings(&path).unwrap().len(), images, "every image has its seconds");
+    }
+}
+
+#[test]
+fn a_broken_line_inside_the_rows_is_an_error_with_its_number() {
+    let (folder, _) = undisturbed();
+    let path = results::results_path(folder.path());
+    let text = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, text.replacen("\"schema\":1", "\"schema\":", 2)).unwrap();
+    let toy = Toy::new();
+    let error = execute(&small(&toy), &toy, folder.path(), &Silent, &options()).unwrap_err();
+    assert!(error.exit_code() == 2 && error.place.ends_with("results.jsonl:1"), "{error}");
+}
+
+#[test]
+fn the_thread_count_is_nowhere_in_the_results() {
+    let (_keep, expected) = undisturbed();
+    for threads in [1, 7] {
+        let folder = tempfile::tempdir().unwrap();
+        let toy = Toy::new();
+        let options = Options { threads, ..options() };
+        execute(&small(&toy), &toy, folder.path(), &Silent, &options).unwrap().check().unwrap();
+        assert_same(&bytes(folder.path()), &expected, format!("{threads} threads"));
+        let timings = results::read_timings(&results::timings_path(folder.path())).unwrap();
+        assert!(timings.iter().all(|timing| timing.threads == threads));
+    }
+}
+
+#[test]
+fn an_experiment_that_grows_keeps_what_it_has_and_shrinks_back_to_the_same_bytes() {
+    let (folder, expected) = undisturbed();
+    let toy = Toy::new();
+    let more = edited("\"samplers\": [", "\"samplers\": [\"net\", ");
+    run(&plan(&more, &toy).unwrap(), &toy, folder.path()).check().unwrap();
+    assert!(toy.rendered.borrow().iter().all(|(_, sampler, ..)| sampler == "net:owen"), "only the new sampler ran");
+    let toy = Toy::new();
+    run(&small(&toy), &toy, folder.path()).check().unwrap();
+    assert_eq!(toy.renders(), 0);
+    let after = bytes(folder.path());
+    assert!(expected.iter().all(|(name, bytes)| after.get(name) == Some(bytes)));
+}
+
+#[test]
+fn an_alias_that_goes_leaves_the_names_of_the_rows() {
+    let (folder, _) = undisturbed();
+    let toy = Toy::new();
+    let fewer = edited(", \"fresh:best\"]", "]");
+    run(&plan(&fewer, &toy).unwrap(), &toy, folder.path()).check().unwrap();
+    assert_eq!(toy.renders(), 0);
+    let named =
+        |row: &Row| matches!(row, Row::Points(row) if row.sampler == "fresh:step" && row.names == ["fresh:sheet"]);
+    assert!(rows(folder.path()).iter().any(named));
+}
+
+#[test]
+fn a_new_reference_is_compared_with_the_images_that_are_there() {
+    let (folder, _) = undisturbed();
+    let toy = Toy::new();
+    let better = edited("\"spp\": 64", "\"spp\": 256");
+    run(&plan(&better, &toy).unwrap(), &toy, folder.path()).check().unwrap();
+    assert_eq!(toy.renders(), 2, "the two halves of the one reference that is rendered");
+    let fresh = tempfile::tempdir().unwrap();
+    run(&plan(&better, &toy).unwrap(), &toy, fresh.path()).check().unwrap();
+    assert_eq!(
+        std::fs::read(results::results_path(folder.path())).unwrap(),
+        std::fs::read(results::results_path(fresh.path())).unwrap()
+    );
+}
+
+#[test]
+fn raised_metrics_measure_again_without_rendering() {
+    let (folder, _) = undisturbed();
+    let base = Toy::new();
+    let toy = Toy { numbers: Algorithms { metrics: 2, ..base.numbers }, ..Toy::new() };
+    run(&small(&toy), &toy, folder.path()).check().unwrap();
+    assert_eq!(toy.renders(), 0);
+    let number = |row: &Row| match row {
+        Row::Image(row) => row.errors.as_ref().map(|errors| errors.metrics_algorithm),
+        Row::Reference(row) => Some(row.metrics_algorithm),
+        Row::Ensemble(row) => Some(row.metrics_algorithm),
+        Row::Points(row) => Some(row.metrics_algorithm),
+    };
+    assert!(rows(folder.path()).iter().filter_map(number).all(|number| number == 2));
+}
+
+/// Takes the images of some kinds away, or spoils them.
+fn spoil(out: &Path, plan: &Plan, kinds: &[Kind], spoil: impl Fn(&Path)) {
+    for item in plan.items.iter().filter(|item| kinds.contains(&item.kind()) && item.kept_image().is_some()) {
+        spoil(&results::image_path(out, &item.id));
+    }
+}
+
+#[test]
+fn a_torn_or_missing_image_is_made_again_when_a_row_needs_it() {
+    let (folder, expected) = undisturbed();
+    let plan = small(&Toy::new());
+    let all = [Kind::Render, Kind::ReferenceHalf, Kind::Reference, Kind::Picture, Kind::Stage];
+    let remove: fn(&Path) = |path| std::fs::remove_file(path).unwrap();
+    let tear: fn(&Path) = |path| {
+        let bytes = std::fs::read(path).unwrap();
+        std::fs::write(path, &bytes[..bytes.len() - 9]).unwrap();
+    };
+    for damage in [remove, tear] {
+        spoil(folder.path(), &plan, &all, damage);
+        // Without rows everything is needed; with all but the last rows little is.
+        std::fs::write(results::results_path(folder.path()), "").unwrap();
+        run(&plan, &Toy::new(), folder.path()).check().unwrap();
+        assert_same(&bytes(folder.path()), &expected, "");
+    }
+}
+
+#[test]
+fn what_a_report_shows_is_made_again_where_only_rows_were_kept() {
+    let (folder, expected) = undisturbed();
+    let toy = Toy::new();
+    let plan = small(&toy);
+    std::fs::remove_dir_all(folder.path().join("images")).unwrap();
+    run(&plan, &toy, folder.path()).check().unwrap();
+    // Three pictures, four stages and the two halves of the pictures' reference; no replicate.
+    assert_eq!(toy.renders(), 3 + 4 + 2);
+    let after = bytes(folder.path());
+    assert_eq!(after["results.jsonl"], expected["results.jsonl"]);
+    assert!(after.iter().all(|(name, bytes)| expected.get(name) == Some(bytes)));
+}
+
+#[test]
+fn code_that_changed_its_bits_under_an_old_number_is_caught() {
+    let (folder, _) = undisturbed();
+    let toy = Toy::new();
+    toy.drift.set(1e-3);
+    std::fs::remove_dir_all(folder.path().join("images")).unwrap();
+    let outcome = run(&small(&toy), &toy, folder.path());
+    let error = outcome.check().unwrap_err();
+    assert!(error.exit_code() == 4 && error.what.contains("kept its algorithm number"), "{error}");
+    let fresh = Options { fresh: true, ..options() };
+    execute(&small(&toy), &toy, folder.path(), &Silent, &fresh).unwrap().check().unwrap();
+}
+
+#[test]
+fn a_fresh_run_does_everything_again_and_leaves_other_files_alone() {
+    let (folder, mut expected) = undisturbed();
+    std::fs::write(folder.path().join("notes.txt"), "mine").unwrap();
+    expected.insert("notes.txt".to_owned(), b"mine".to_vec());
+    let toy = Toy::new();
+    let plan = small(&toy);
+    let options = Options { fresh: true, ..options() };
+    let outcome = execute(&plan, &toy, folder.path(), &Silent, &options).unwrap();
+    assert_eq!((outcome.found, outcome.done), (0, plan.items.len()));
+    assert_same(&bytes(folder.path()), &expected, "");
+}
+
+#[test]
+fn an_item_that_fails_fails_alone_and_is_tried_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let toy = Toy { broken: Some(("strata:jitter", 4)), ..Toy::new() };
+    let plan = small(&toy);
+    let outcome = run(&plan, &toy, folder.path());
+    // Two scenes × (3 replicates + their ensemble).
+    assert_eq!((outcome.failures.len(), outcome.done), (8, plan.items.len() - 8));
+    let error = outcome.check().unwrap_err();
+    assert!(error.exit_code() == 4 && error.what.contains("pixel (1, 2), sample 3"), "{error}");
+    assert_eq!(rows(folder.path()).len(), plan.items.len() - 8);
+    let broken =
+        toy.rendered.borrow().iter().filter(|(_, sampler, spp, _)| sampler == "strata:jitter" && *spp == 4).count();
+    assert_eq!(broken, 6, "what failed is not tried again for its ensemble");
+    let mended = Toy::new();
+    run(&plan, &mended, folder.path()).check().unwrap();
+    assert_eq!(mended.renders(), 6);
+    assert_same(&bytes(folder.path()), &undisturbed().1, "");
+}
+
+#[test]
+fn a_reference_that_fails_takes_down_what_is_compared_with_it_and_no_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let toy = Toy { broken: Some(("truth:owen", 64)), ..Toy::new() };
+    let outcome = run(&small(&toy), &toy, folder.path());
+    let (mut scenes, mut kinds) = (HashSet::new(), HashSet::new());
+    for row in rows(folder.path()) {
+        kinds.insert(row.kind());
+        if let Row::Ensemble(row) = row {
+            scenes.insert(row.scene);
+        }
+    }
+    assert_eq!(scenes, HashSet::from(["exact".to_owned()]));
+    assert!(kinds.contains(&Kind::Picture) && kinds.contains(&Kind::Points));
+    assert_eq!(outcome.check().unwrap_err().exit_code(), 4);
+}
+
+#[test]
+fn a_stop_from_elsewhere_ends_after_the_item_at_hand() {
+    let folder = tempfile::tempdir().unwrap();
+    let toy = Toy::new();
+    let stop = AtomicBool::new(false);
+
+    /// Stops at the third item.
+    struct StopAt<'a>(&'a AtomicBool, Cell<usize>);
+    impl Progress for StopAt<'_> {
+        fn item_started(&self, _: &str, _: &Tick) {
+            self.1.set(self.1.get() + 1);
+            self.0.store(self.1.get() == 3, Ordering::Relaxed);
+        }
+        fn item_ended(&self, _: &Tick) {}
+        fn warn(&self, message: &str) {
+            panic!("{message}");
+        }
+    }
+
+    let options = Options { stop: Some(&stop), ..options() };
+    let progress = StopAt(&stop, Cell::new(0));
+    let outcome = execute(&small(&toy), &toy, folder.path(), &progress, &options).unwrap();
+    assert!(outcome.interrupted);
+    assert_eq!((outcome.done, rows(folder.path()).len()), (3, 3));
+}
+
+#[test]
+fn two_runs_in_one_folder_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+
+    /// Starts another run from within a run.
+    struct Again<'a>(&'a Path, Cell<usize>);
+    impl Progress for Again<'_> {
+        fn item_started(&self, _: &str, _: &Tick) {
+            let toy = Toy::new();
+            let error = execute(&small(&toy), &toy, self.0, &Silent, &options()).unwrap_err();
+            assert!(error.what.contains("found one at work"), "{error}");
+            self.1.set(self.1.get() + 1);
+        }
+        fn item_ended(&self, _: &Tick) {}
+        fn warn(&self, _: &str) {}
+    }
+
+    let toy = Toy::new();
+    let progress = Again(folder.path(), Cell::new(0));
+    let options = Options { at_most: Some(2), ..options() };
+    execute(&small(&toy), &toy, folder.path(), &progress, &options).unwrap();
+    assert_eq!(progress.1.get(), 2);
+}
+
+// --- costs ---
+
+#[test]
+fn a_survey_counts_what_is_left_and_changes_nothing() {
+    let toy = Toy::new();
+    let plan = small(&toy);
+    let folder = tempfile::tempdir().unwrap();
+    let survey = |out: &Path| Survey::new(&plan, &Standing::read(&plan, out).unwrap(), out, 2);
+    let before = survey(folder.path());
+    // Statistics: 3 + 1 replicates take what is asked, strata 2 for 1; ramp 5×4, exact 4×4. Reference 2 × 64 on ramp.
+    let statistics = (20 + 16) * (4 * (1 + 4) + 3 * (2 + 4)) + 20 * 2 * 64;
+    let pictures = 32 * (2 * 16 + 3 * 2 + 1 + 3 * 3);
+    assert_eq!(before.samples, statistics + pictures);
+    assert_eq!(before.samples_left, before.samples);
+    assert!(!before.is_rate_measured && before.seconds_left > 0.0);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    let options = Options { at_most: Some(30), ..options() };
+    execute(&plan, &toy, folder.path(), &Silent, &options).unwrap();
+    let during = survey(folder.path());
+    assert!(during.is_rate_measured && during.samples_left < before.samples_left);
+    let half = plan.items.iter().find(|item| item.kind() == Kind::ReferenceHalf).unwrap();
+    std::fs::remove_file(results::image_path(folder.path(), &half.id)).unwrap();
+    assert_eq!(survey(folder.path()).samples_left, during.samples_left + half.samples(), "needed by items left");
+    run(&plan, &toy, folder.path()).check().unwrap();
+    let after = survey(folder.path());
+    assert_eq!((after.samples_left, after.seconds_left), (0, 0.0));
+    assert!(after.to_string().contains("stage                4 items, 0 to do"), "{after}");
+}
+
+#[test]
+fn more_memory_or_disk_than_allowed_is_refused_before_work_starts() {
+    let toy = Toy::new();
+    let plan = small(&toy);
+    let folder = tempfile::tempdir().unwrap();
+    let survey = Survey::new(&plan, &Standing::read(&plan, folder.path()).unwrap(), folder.path(), 1);
+    let enough = Limits { memory_bytes: survey.memory_bytes, disk_bytes: survey.disk_bytes };
+    for (limits, what) in [
+        (Limits { memory_bytes: enough.memory_bytes - 1, ..enough }, "of memory"),
+        (Limits { disk_bytes: enough.disk_bytes - 1, ..enough }, "of disk"),
+    ] {
+        let error = execute(&plan, &toy, folder.path(), &Silent, &Options { limits, ..options() }).unwrap_err();
+        assert!(error.exit_code() == 2 && error.what.contains(what), "{error}");
+    }
+    assert_eq!(toy.renders(), 0);
+    execute(&plan, &toy, folder.path(), &Silent, &Options { limits: enough, ..options() }).unwrap();
+    let on_disk: usize = bytes(folder.path()).values().map(Vec::len).sum();
+    assert!((on_disk as u64) < survey.disk_bytes, "{on_disk} bytes, {} foreseen", survey.disk_bytes);
+}
+
+#[test]
+fn a_picture_stands_with_what_is_shown() {
+    let plan = small(&Toy::new());
+    let (folder, _) = undisturbed();
+    let standing = Standing::read(&plan, folder.path()).unwrap();
+    assert!(standing.states.iter().all(|&state| state == State::Done));
+    let shown: Vec<Kind> = plan.items.iter().filter(|item| item.is_shown).map(|item| item.kind()).collect();
+    assert_eq!(shown.len(), 2 + 1 + 3 + 4);
+    let stages = plan.items.iter().filter_map(|item| match &item.work {
+        Work::Image(work) if work.kind == Kind::Stage => Some((work.stage, work.spp.asked)),
+        _ => None,
+    });
+    let expected = [(Stage::Start, 1), (Stage::Aa, 3), (Stage::Dof, 3), (Stage::Final, 3)];
+    assert!(stages.eq(expected));
+}
