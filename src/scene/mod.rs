@@ -1,6 +1,10 @@
 //! Scenes: config files, meshes, camera, lights.
+pub mod camera;
+pub mod compile;
 pub mod config;
+pub mod geometry;
 pub mod json;
+pub mod light;
 pub mod load;
 pub mod mesh;
 pub mod obj;
