@@ -199,6 +199,13 @@ impl Backend for Lab {
         })
     }
 
+    fn focal_depth(&self, scene: &str, size: Size) -> Option<f64> {
+        let mut scenes = self.scenes.borrow_mut();
+        let full = scenes.get_mut(scene)?.compiled.get_mut(Stage::Final.name())?;
+        full.resize((size.width, size.height));
+        full.focal_depth().map(f64::from)
+    }
+
     fn exact_reference(&self, scene: &str, size: Size) -> Result<Image> {
         match self.with(scene, |opened| exact::closed_form(&opened.loaded, size)) {
             Some(exact) => exact::image(&exact, size),
