@@ -352,6 +352,32 @@ fn quads_and_polygons_become_triangles_and_keep_smooth_normals_and_uvs() {
     assert_eq!((mesh.normals[6], mesh.uvs[6]), ([Vec3::Z, Vec3::Z, Vec3::X], mesh.uvs[2]), "a joined line");
 }
 
+#[test]
+fn what_a_material_cannot_show_is_said() {
+    let mtl = "newmtl wall\nKd 0 0 0\nmap_Kd t.png\nmap_bump b.png\nnewmtl light\nKd 1 1 1\nKe 1 0 0\nmap_Kd t.png\n";
+    let folder = with_mtl(mtl);
+    sampler_lab::film::write_png_rgb8(&folder.path("t.png"), 1, 1, &[9, 9, 9]).unwrap();
+    let scene = folder.open(&[]).unwrap();
+    assert_eq!(scene.mesh.materials[1].emission, Vec3::splat(0.2126), "luma of red, Rec. 709");
+    assert_has(
+        &scene.warnings.join("\n"),
+        &[
+            "a.mtl: not modelled and left out: map_bump",
+            "a.mtl:1: \"wall\" has a texture that does not show",
+            "a.mtl:5: \"light\" has a coloured Ke",
+            "a.mtl:5: \"light\" has a texture that does not change what it emits",
+        ],
+    );
+    let bright =
+        folder.open(&[r#"scene.materials=[{"name": "light", "albedo_col": [2, 0, 0], "emissive_strength": 1e38}]"#]);
+    assert!(
+        bright.unwrap().warnings[0].contains("scene.materials[0].albedo_col: [2, 0, 0] reflects more than it receives")
+    );
+    let too_bright =
+        folder.error(&[r#"scene.materials=[{"name": "light", "albedo_col": [9, 0, 0], "emissive_strength": 1e38}]"#]);
+    assert_has(&too_bright, &["a.mtl:5: expected an emission below 3.4e38"]);
+}
+
 /// Twice the area, signed by the z axis.
 fn area_z([a, b, c]: [Vec3; 3]) -> f32 {
     (b - a).cross(c - a).z

@@ -168,6 +168,8 @@ pub(super) fn draw_axis_names(drawing: &mut Drawing, b: &Bounds, frame: &Frame) 
 
 /// What stands in a plot without data.
 pub(super) fn draw_no_data(drawing: &mut Drawing, b: &Bounds) {
-    let middle = ((b.left + b.right) / 2.0, (b.top + b.bottom) / 2.0 + 5.0);
-    drawing.text(middle, "no data", TITLE, GREY, Align::Centre);
+    let (x, y) = ((b.left + b.right) / 2.0, (b.top + b.bottom) / 2.0);
+    // Covers the grid lines behind the words.
+    drawing.rectangle(Bounds { left: x - 40.0, top: y - 14.0, right: x + 40.0, bottom: y + 14.0 }, [255; 3], 1.0);
+    drawing.text((x, y + 5.0), "no data", TITLE, GREY, Align::Centre);
 }

@@ -138,7 +138,8 @@ const INTERVAL_REACH: f64 = 2.0;
 fn axis_of(values: &[(f64, Option<(f64, f64)>)], from: f64, to: f64) -> LogAxis {
     let (low, high) = values.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(v.0), h.max(v.0)));
     let ends = values.iter().filter_map(|v| v.1);
-    let ends = ends.flat_map(|(l, h)| [l.max(low / INTERVAL_REACH), h.min(high * INTERVAL_REACH)]);
+    let ends =
+        ends.flat_map(|(l, h)| [l.max(low / INTERVAL_REACH).max(f64::MIN_POSITIVE), h.min(high * INTERVAL_REACH)]);
     LogAxis::around(values.iter().map(|v| v.0).chain(ends), 0.06, from, to)
 }
 

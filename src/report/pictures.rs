@@ -119,7 +119,8 @@ const CAPTION_STEP: f64 = 16.0;
 /// Letters are sized to read well when the strip is shown 860 pixels wide.
 ///
 /// # Errors
-/// Kind `Input` where a crop is empty, has zoom 0 or reaches out of an image.
+/// Kind `Input` where a crop is empty, has zoom 0 or reaches out of an image, or where the strip would be wider or higher
+/// than 16384 pixels.
 pub fn strip(cells: &[StripCell], layout: &StripLayout) -> Result<Rgb8> {
     for (cell, crop) in cells.iter().flat_map(|cell| layout.crops.iter().map(move |crop| (cell, crop))) {
         let (width, height) = (cell.image.width, cell.image.height);
@@ -132,7 +133,29 @@ pub fn strip(cells: &[StripCell], layout: &StripLayout) -> Result<Rgb8> {
             return Err(Error::input(format!("strip, image {}", cell.title), what));
         }
     }
+    check_size(cells, layout)?;
     Ok(Grid::new(cells, layout).drawn(cells))
+}
+
+/// Longest edge of a strip, in pixels: 3.2 GB at worst while letters are painted, and far more than any page shows.
+const LONGEST: u64 = 16_384;
+
+/// Whether the zoomed images and crops of all cells stay below the longest edge, counted generously.
+fn check_size(cells: &[StripCell], layout: &StripLayout) -> Result<()> {
+    let zoom = u64::from(layout.whole.unwrap_or(0));
+    let edges = |cell: &StripCell| u64::from(cell.image.width.max(cell.image.height)).saturating_mul(zoom);
+    let whole = cells.iter().map(edges).max().unwrap_or(0);
+    let edge = |crop: &Crop| u64::from(crop.width.max(crop.height)).saturating_mul(crop.zoom.into()).saturating_add(4);
+    let crops = layout.crops.iter().map(edge).fold(0, u64::saturating_add);
+    let across = layout.columns.clamp(1, cells.len().max(1));
+    let cells = across.max(cells.len().div_ceil(across)) as u64;
+    let longest = whole.saturating_add(crops).saturating_mul(cells);
+    if longest > LONGEST {
+        let what =
+            format!("expected images and crops of at most {LONGEST} pixels in all, found {longest}; lower the zoom");
+        return Err(Error::input("strip", what));
+    }
+    Ok(())
 }
 
 /// Sizes of a strip in pixels: every cell is as large as the largest.
@@ -418,10 +441,10 @@ mod tests {
     }
 
     #[test]
-    fn a_crop_outside_its_image_is_an_input_error() {
+    fn a_crop_outside_its_image_or_too_large_is_an_input_error() {
         let image = Rgb8::filled(8, 6, WHITE);
         let cell = StripCell { image: &image, title: "ld".into(), captions: vec![] };
-        for (x, width, zoom) in [(6, 4, 2), (u32::MAX, 2, 2), (0, 0, 2), (0, 2, 0)] {
+        for (x, width, zoom) in [(6, 4, 2), (u32::MAX, 2, 2), (0, 0, 2), (0, 2, 0), (0, 2, u32::MAX)] {
             let crop = Crop { x, y: 0, width, height: 2, zoom, colour: [0; 3] };
             let layout = StripLayout { columns: 1, whole: None, crops: vec![crop], scale_bar: None };
             assert_eq!(strip(std::slice::from_ref(&cell), &layout).unwrap_err().exit_code(), 2);

@@ -112,41 +112,64 @@ pub fn small_multiples(frame: &Frame, plots: &[Plot], columns: usize) -> Figure 
 
 fn drawn_grid(frame: &Frame, plots: &[Plot], columns: usize) -> Drawing {
     let (plots, left_out): (Vec<Plot>, Vec<LeftOut>) = plots.iter().map(showable).unzip();
-    let columns = columns.clamp(1, plots.len().max(1));
-    let rows = plots.len().max(1).div_ceil(columns);
     let axes = Axes::of(frame, &plots);
     let floors = plots.iter().map(|plot| axes.floor_note(plot).map(|note| format!("{}: {note}", plot.title)));
     let notes: Vec<_> = std::iter::once(LeftOut::sum(&left_out).note()).chain(floors).collect();
     let header = Header::new(frame, &notes);
     let legend = Legend::of(&plots);
-    let (gap, title) = (18.0, 22.0);
-    let width = (PAGE_WIDTH - left_margin(&axes.y_ticks) - 14.0 - gap * (columns - 1) as f64) / columns as f64;
-    let panel_height = (width * 0.95).clamp(210.0, 330.0);
-    let last_row = plots.len().saturating_sub(columns);
-    let height =
-        header.height + rows as f64 * (title + panel_height) + (rows - 1) as f64 * 22.0 + FOOT + legend.height();
-    let mut drawing = Drawing::new(PAGE_WIDTH, height);
+    let cells = Cells::new(plots.len(), columns, left_margin(&axes.y_ticks), header.height);
+    let all = cells.all();
+    let mut drawing = Drawing::new(PAGE_WIDTH, all.bottom + FOOT + legend.height());
     header.draw(&mut drawing);
-    let at = |i: usize| {
-        let left = left_margin(&axes.y_ticks) + (i % columns) as f64 * (width + gap);
-        let top = header.height + (i / columns) as f64 * (title + panel_height + 22.0) + title;
-        Bounds { left, top, right: left + width, bottom: top + panel_height }
-    };
     for (i, plot) in plots.iter().enumerate() {
-        let panel = Panel::new(&axes, at(i));
-        let name = shortened(&plot.title, HEADING, true, width);
-        drawing.heading((at(i).left, at(i).top - 7.0), &name);
-        panel.draw_frame(&mut drawing, i % columns == 0, i >= last_row);
+        let b = cells.at(i);
+        let panel = Panel::new(&axes, b);
+        drawing.heading((b.left, b.top - 7.0), &shortened(&plot.title, HEADING, true, b.right - b.left));
+        panel.draw_frame(&mut drawing, i % cells.columns == 0, i + cells.columns >= plots.len());
         panel.draw_helpers(&mut drawing, plot, false);
         panel.draw_lines(&mut drawing, plot);
     }
-    let all = Bounds { bottom: at(plots.len().max(1) - 1).bottom, right: at(columns - 1).right, ..at(0) };
     if plots.is_empty() {
-        Panel::new(&axes, all).draw_lines(&mut drawing, &Plot::default());
+        draw_no_data(&mut drawing, &all);
     }
     draw_axis_names(&mut drawing, &all, frame);
-    legend.draw(&mut drawing, left_margin(&axes.y_ticks), all.bottom + FOOT);
+    legend.draw(&mut drawing, all.left, all.bottom + FOOT);
     drawing
+}
+
+/// Where the panels of a grid stand.
+struct Cells {
+    count: usize,
+    columns: usize,
+    first: Bounds,
+}
+
+impl Cells {
+    const GAP: f64 = 18.0;
+    /// Above each panel, for its title; and between rows, for tick labels of a row that is not the last.
+    const TITLE_ROOM: f64 = 22.0;
+
+    /// At least one panel, the first column's left edge at `left`, the first title's top at `top`.
+    fn new(count: usize, columns: usize, left: f64, top: f64) -> Self {
+        let count = count.max(1);
+        let columns = columns.clamp(1, count);
+        let width = (PAGE_WIDTH - left - 14.0 - Self::GAP * (columns - 1) as f64) / columns as f64;
+        let top = top + Self::TITLE_ROOM;
+        let height = (width * 0.95).clamp(210.0, 330.0);
+        Self { count, columns, first: Bounds { left, top, right: left + width, bottom: top + height } }
+    }
+
+    fn at(&self, i: usize) -> Bounds {
+        let Bounds { left, top, right, bottom } = self.first;
+        let across = (i % self.columns) as f64 * (right - left + Self::GAP);
+        let down = (i / self.columns) as f64 * (bottom - top + 2.0 * Self::TITLE_ROOM);
+        Bounds { left: left + across, top: top + down, right: right + across, bottom: bottom + down }
+    }
+
+    /// The box around all panels.
+    fn all(&self) -> Bounds {
+        Bounds { right: self.at(self.columns - 1).right, bottom: self.at(self.count - 1).bottom, ..self.first }
+    }
 }
 
 /// The plot with only the points that can be shown, by ascending x, and only the series, guides and floor that are
@@ -188,7 +211,9 @@ struct Axes {
 impl Axes {
     fn of(frame: &Frame, plots: &[Plot]) -> Self {
         let (low, high) = data(plots).fold((f64::INFINITY, 0.0_f64), |(l, h), p| (l.min(p.y), h.max(p.y)));
-        let reach = |p: &Datum| p.interval.map(|(l, h)| [l.max(low / INTERVAL_REACH), h.min(high * INTERVAL_REACH)]);
+        let reach = |p: &Datum| {
+            p.interval.map(|(l, h)| [l.max(low / INTERVAL_REACH).max(f64::MIN_POSITIVE), h.min(high * INTERVAL_REACH)])
+        };
         let floors = plots.iter().filter_map(|plot| plot.floor.as_ref()).map(|floor| floor.value);
         let floors = floors.filter(|&value| value >= low / FLOOR_REACH && value <= high * FLOOR_REACH);
         let y_values =

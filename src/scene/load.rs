@@ -227,56 +227,25 @@ impl Builder<'_> {
         Ok(())
     }
 
-    /// The material that `declared` and its patch make; without `declared`, the default grey.
+    /// The material that `declared` and its patch make; without `declared`, the default grey, without a name.
     fn material(&mut self, declared: Option<&MtlMaterial>, file: u32, obj_path: &Path) -> Result<Material> {
         let Some(mtl) = declared else {
-            let name = String::new();
-            return Ok(Material {
-                name,
-                file,
-                albedo: Vec3::splat(DEFAULT_ALBEDO),
-                texture: None,
-                emission: Vec3::ZERO,
-                is_emitter: false,
-            });
+            let (name, albedo) = (String::new(), Vec3::splat(DEFAULT_ALBEDO));
+            return Ok(Material { name, file, albedo, texture: None, emission: Vec3::ZERO, is_emitter: false });
         };
         let config = self.config;
         let patch = config.materials.iter().find(|patch| patch.name == mtl.name);
         let albedo = patch.and_then(|p| p.albedo_col).unwrap_or_else(|| own_albedo(mtl, &mut self.warnings));
-        let strength = strength(mtl, patch);
-        let emission = albedo * strength;
-        if strength > 0.0 && albedo == Vec3::ZERO {
-            let what = "expected a colour for what emits (Kd, else Ks, or albedo_col of a patch)";
-            return Err(Error::input(&mtl.place, format!("{what}, found black in material {:?}", mtl.name)));
-        }
-        if !emission.is_finite() {
-            let what = format!("expected an emission below 3.4e38, found albedo {albedo} times strength {strength}");
-            return Err(Error::input(&mtl.place, format!("{what} in material {:?}", mtl.name)));
-        }
-        self.note_simplification(mtl, patch, strength > 0.0);
+        let emission = emission(mtl, albedo, strength(mtl, patch))?;
+        let is_emitter = emission != Vec3::ZERO;
         let texture = match &mtl.map_kd {
             Some((place, name)) => Some(self.texture(&beside(obj_path, name), name, place)?),
             None => None,
         };
-        if texture.is_some() && albedo == Vec3::ZERO {
-            self.warnings
-                .push(format!("{}: the texture of {:?} does not show: it multiplies black", mtl.place, mtl.name));
+        for note in notes(mtl, patch, albedo, is_emitter) {
+            self.warnings.push(format!("{}: {:?} {note}", mtl.place, mtl.name));
         }
-        if texture.is_some() && strength > 0.0 {
-            self.warnings.push(format!("{}: the texture of {:?} does not change what it emits", mtl.place, mtl.name));
-        }
-        Ok(Material { name: mtl.name.clone(), file, albedo, texture, emission, is_emitter: emission != Vec3::ZERO })
-    }
-
-    /// Says so where a type other than diffuse is asked for.
-    fn note_simplification(&mut self, mtl: &MtlMaterial, patch: Option<&MaterialPatch>, emits: bool) {
-        let wanted = match (patch.and_then(|p| p.kind.as_deref()), mtl.illum) {
-            (Some(kind), _) if is_diffuse(kind) || (emits && says_emitter(kind)) => return,
-            (Some(kind), _) => format!("type {kind:?}"),
-            (None, Some(illum)) if illum >= 3 => format!("illum {illum}"),
-            (None, _) => return,
-        };
-        self.warnings.push(format!("{}: {:?} ({wanted}) is rendered as diffuse", mtl.place, mtl.name));
+        Ok(Material { name: mtl.name.clone(), file, albedo, texture, emission, is_emitter })
     }
 
     /// The index of the texture at `path`, loaded at its first use.
@@ -469,6 +438,43 @@ fn strength(mtl: &MtlMaterial, patch: Option<&MaterialPatch>) -> f32 {
     let luma = (0.2126 * r + 0.7152 * g + 0.0722 * b) as f32;
     let says = says_emitter(&mtl.name) || patch.and_then(|p| p.kind.as_deref()).is_some_and(says_emitter);
     if luma > 0.0 || !says { luma } else { DEFAULT_STRENGTH }
+}
+
+/// Emitted radiance: albedo × strength.
+fn emission(mtl: &MtlMaterial, albedo: Vec3, strength: f32) -> Result<Vec3> {
+    if strength > 0.0 && albedo == Vec3::ZERO {
+        let what = "expected a colour for what emits (Kd, else Ks, or albedo_col of a patch)";
+        return Err(Error::input(&mtl.place, format!("{what}, found black in material {:?}", mtl.name)));
+    }
+    let emission = albedo * strength;
+    if emission.is_finite() {
+        return Ok(emission);
+    }
+    let what = format!("expected an emission below 3.4e38, found albedo {albedo} times strength {strength}");
+    Err(Error::input(&mtl.place, format!("{what} in material {:?}", mtl.name)))
+}
+
+/// What of a material does not show in the picture.
+fn notes(mtl: &MtlMaterial, patch: Option<&MaterialPatch>, albedo: Vec3, is_emitter: bool) -> Vec<String> {
+    let mut notes = Vec::new();
+    match (patch.and_then(|p| p.kind.as_deref()), mtl.illum) {
+        (Some(kind), _) if is_diffuse(kind) || (is_emitter && says_emitter(kind)) => {}
+        (Some(kind), _) => notes.push(format!("(type {kind:?}) is rendered as diffuse")),
+        // The MTL models from 3 up reflect or refract; the scene file's type has the last word.
+        (None, Some(illum)) if illum >= 3 => notes.push(format!("(illum {illum}) is rendered as diffuse")),
+        (None, _) => {}
+    }
+    let takes_luma = is_emitter && patch.is_none_or(|p| p.emissive_strength.is_none());
+    if takes_luma && mtl.ke.is_some_and(|[r, g, b]| r != g || g != b) {
+        notes.push("has a coloured Ke: only its luma counts, times the albedo".to_owned());
+    }
+    if mtl.map_kd.is_some() && albedo == Vec3::ZERO {
+        notes.push("has a texture that does not show: it multiplies black".to_owned());
+    }
+    if mtl.map_kd.is_some() && is_emitter {
+        notes.push("has a texture that does not change what it emits".to_owned());
+    }
+    notes
 }
 
 /// Whether a name or type means an emitter.
