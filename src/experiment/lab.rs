@@ -37,11 +37,16 @@ pub const POINT_METRICS: [&str; 12] = [
     "min_toroidal_distance",
 ];
 
+/// A scene in memory at the busiest moment, in sizes of itself: the mesh as loaded, the full scene, that of one stage,
+/// and what building a tree needs meanwhile.
+const SCENE_COPIES: u64 = 5;
+
 /// A scene that was opened.
 struct Opened {
     loaded: LoadedScene,
     /// Decisions of the full picture.
     layout: SampleLayout,
+    /// By stage: the full scene always, one other at the most.
     compiled: HashMap<&'static str, Scene>,
 }
 
@@ -133,7 +138,7 @@ impl Backend for Lab {
             layout: full.layout.to_string(),
             exact_reference: exact::closed_form(&loaded, size).is_some(),
             lens: full.focal_depth().is_some(),
-            memory_bytes: 2 * full.bytes() as u64,
+            memory_bytes: SCENE_COPIES * full.bytes() as u64,
         };
         let layout = full.layout.clone();
         let compiled = HashMap::from([(Stage::Final.name(), full)]);
@@ -176,6 +181,7 @@ impl Backend for Lab {
         let mut scenes = self.scenes.borrow_mut();
         let opened = scenes.get_mut(request.scene).expect("a plan asks for scenes that it opened");
         let size = (request.size.width, request.size.height);
+        opened.compiled.retain(|&stage, _| stage == Stage::Final.name() || stage == request.stage.name());
         let scene = match opened.compiled.entry(request.stage.name()) {
             std::collections::hash_map::Entry::Occupied(entry) => entry.into_mut(),
             std::collections::hash_map::Entry::Vacant(entry) => {
