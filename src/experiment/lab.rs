@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::film::Image;
 use crate::render;
 use crate::sampling::{self, Preset, SampleLayout, Sampler, SamplerSet, SamplerSpec, point_set};
-use crate::scene::compile::{Scene, Stage, content_hash};
+use crate::scene::compile::{Scene, Stage};
 use crate::scene::load::{self, LoadedScene, OpenOptions};
 use crate::stats::discrepancy::{L2Kind, Points, l2_root, min_toroidal_distance, star_2d, t_value};
 
@@ -132,7 +132,7 @@ impl Backend for Lab {
         let full = Scene::new(&loaded.config, loaded.mesh.clone(), (size.width, size.height), Stage::Final)?;
         let facts = SceneFacts {
             name: name.clone(),
-            content_hash: content_hash(&loaded),
+            content_hash: loaded.content_sha256(),
             size,
             spp: framebuffer.sppx,
             layout: full.layout.to_string(),

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use glam::{DVec3, Vec2, Vec3};
 use sha2::{Digest, Sha256};
 
-use super::config::{MaterialPatch, SceneConfig};
+use super::config::{Estimator, FramebufferConfig, MaterialPatch, SceneConfig};
 use super::json::suggestion;
 use super::mesh::{Material, Mesh, Texture};
 use super::obj::{self, CheckedObj, MtlMaterial};
@@ -64,8 +64,11 @@ impl LoadedScene {
     /// exposure, estimator): the full state, defaults and `--set` applied, and the other files' names and bytes. The
     /// scene file's own layout does not count.
     pub fn content_sha256(&self) -> String {
-        let state =
-            SceneConfig { framebuffer: FramebufferConfig::default(), estimator: Estimator::Unbiased, ..self.config.clone() };
+        let state = SceneConfig {
+            framebuffer: FramebufferConfig::default(),
+            estimator: Estimator::Unbiased,
+            ..self.config.clone()
+        };
         let mut text = state.to_json();
         for input in self.inputs.iter().skip(1) {
             text.push_str(&format!("{} {}\n", input.sha256, input.name));
