@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::backend::{Estimator, PointMetrics, SceneFacts, Size, Stage};
+use super::backend::{Estimator, PointMetrics, SceneFacts, Size, Stage, estimator_word, stage_word};
 
 use super::spec::Experiment;
 use crate::error::{Error, Result};
@@ -124,8 +124,10 @@ pub struct ImageRow {
     #[serde(serialize_with = "decimal", deserialize_with = "from_decimal")]
     pub seed: u64,
     /// Light estimator.
+    #[serde(with = "estimator_word")]
     pub estimator: Estimator,
     /// How much of the picture is sampled.
+    #[serde(with = "stage_word")]
     pub stage: Stage,
     /// Image size.
     pub size: Size,
@@ -185,6 +187,7 @@ pub struct EnsembleRow {
     /// Samples per pixel.
     pub spp: Count,
     /// Light estimator.
+    #[serde(with = "estimator_word")]
     pub estimator: Estimator,
     /// Image size.
     pub size: Size,
