@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use sampler_lab::error::{Error, Result};
 use sampler_lab::experiment::backend::{Algorithms, Backend, PointMetrics, RenderRequest, SceneFacts, Size, Stage};
 use sampler_lab::experiment::execute::{Options, Outcome, execute};
+use sampler_lab::experiment::lab::Lab;
 use sampler_lab::experiment::plan::{Plan, Work, plan, refuse_equal_seeds};
 use sampler_lab::experiment::progress::{Progress, Silent, Tick};
 use sampler_lab::experiment::results::{self, Kind, Row};
@@ -16,6 +17,8 @@ use sampler_lab::experiment::spec::Experiment;
 use sampler_lab::experiment::survey::{Limits, Standing, State, Survey};
 use sampler_lab::film::{Image, read_exr};
 use sampler_lab::scene::json;
+use sampler_lab::scene::load::OpenOptions;
+use sampler_lab::stats::{Family, t_test};
 
 /// A backend whose image is a ramp plus noise of variance 1/spp, so errors behave like errors.
 struct Toy {
@@ -73,7 +76,7 @@ impl Backend for Toy {
             spp: 3,
             layout: "pixel 0-1".to_owned(),
             exact_reference: name == "exact",
-            lens: false,
+            lens: name == "ramp",
             memory_bytes: 1000,
         })
     }
@@ -122,6 +125,10 @@ impl Backend for Toy {
             }
         }
         Ok(image)
+    }
+
+    fn focal_depth(&self, scene: &str, _: Size) -> Option<f64> {
+        (scene == "ramp").then_some(4.5)
     }
 
     fn exact_reference(&self, scene: &str, size: Size) -> Result<Image> {
@@ -226,6 +233,24 @@ fn the_experiments_that_come_with_the_lab_read() {
         let experiment = Experiment::read(&path).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(path.file_stem().unwrap().to_str(), Some(experiment.name.as_str()));
     }
+}
+
+/// Whatever one slip of the hand makes of a file, the answer is an experiment or a message, never a panic.
+#[test]
+fn no_byte_left_out_or_put_in_upsets_the_reader() {
+    let mut refused = 0;
+    for at in 0..SMALL.len() {
+        for slip in [&b""[..], b"\"", b"-", b"9", b"{", b"\xff"] {
+            let mut text = SMALL.as_bytes().to_vec();
+            text.splice(at..=at, slip.iter().copied());
+            let read = json::parse(&text, "small.json").and_then(|value| Experiment::from_value(&value, "small.json"));
+            if let Err(error) = read {
+                assert!(error.exit_code() == 2 && error.place.starts_with("small.json"), "{error}");
+                refused += 1;
+            }
+        }
+    }
+    assert!(refused > SMALL.len(), "{refused}");
 }
 
 // --- plans ---
@@ -395,7 +420,10 @@ fn rows_are_in_plan_order_and_complete() {
                 assert_eq!(row.replicates, if is_random { 3 } else { 1 });
                 assert_eq!(row.variance.is_some(), is_random, "nothing random has no variance");
             }
-            Row::Reference(row) => assert_eq!(row.noise_mse == 0.0, row.scene == "exact"),
+            Row::Reference(row) => {
+                assert_eq!(row.noise_mse == 0.0, row.scene == "exact");
+                assert_eq!(row.focal_depth, (row.scene == "ramp").then_some(4.5), "what auto focus found is recorded");
+            }
             Row::Image(row) if row.sampler == "fresh:step" => assert_eq!(row.names, ["fresh:sheet", "fresh:best"]),
             Row::Image(_) | Row::Points(_) => {}
         }
@@ -703,6 +731,19 @@ fn a_stop_from_elsewhere_ends_after_the_item_at_hand() {
 }
 
 #[test]
+fn a_folder_that_cannot_be_written_is_a_writing_error_and_nothing_is_rendered() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("a-file");
+    std::fs::write(&file, "mine").unwrap();
+    let toy = Toy::new();
+    for out in [file.clone(), file.join("below")] {
+        let error = execute(&small(&toy), &toy, &out, &Silent, &options()).unwrap_err();
+        assert_eq!(error.exit_code(), 3, "{error}");
+    }
+    assert_eq!((toy.renders(), std::fs::read(&file).unwrap()), (0, b"mine".to_vec()));
+}
+
+#[test]
 fn two_runs_in_one_folder_are_refused() {
     let folder = tempfile::tempdir().unwrap();
 
@@ -789,4 +830,119 @@ fn a_picture_stands_with_what_is_shown() {
     });
     let expected = [(Stage::Start, 1), (Stage::Aa, 3), (Stage::Dof, 3), (Stage::Final, 3)];
     assert!(stages.eq(expected));
+}
+
+// --- the lab's own backend ---
+
+/// A lab whose scenes are the repository's.
+fn lab(sets: &[&str]) -> Lab {
+    let experiment = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/experiments/tiny.json");
+    let sets = sets.iter().map(|&set| set.to_owned()).collect();
+    Lab::new(&experiment, OpenOptions { sets, ..OpenOptions::default() })
+}
+
+const TINY: &str = r#"{
+    "name": "tiny", "seed": 3, "scenes": ["cornell", "penumbra"], "size": "9x9",
+    "samplers": ["uniform", "stratified:sheet", "halton:sheet", "ld:best"], "spp": [1, 5], "replicates": 3,
+    "reference": {"sampler": "sobol", "spp": 32},
+    "points": {"n": [1, 8], "metrics": ["star", "l2_star", "t_value", "min_toroidal_distance"], "replicates": 2},
+    "pictures": {"scene": "penumbra", "size": "12x12", "spp": 2}
+}"#;
+
+#[test]
+fn the_lab_gives_the_same_bytes_on_1_2_and_7_threads_and_after_a_kill() {
+    let mut expected = None;
+    for (threads, at_most) in [(2, usize::MAX), (1, usize::MAX), (7, 23)] {
+        let folder = tempfile::tempdir().unwrap();
+        let lab = lab(&[]);
+        let plan = plan(&experiment(TINY), &lab).unwrap();
+        loop {
+            let options = Options { threads, at_most: Some(at_most), ..options() };
+            let outcome = execute(&plan, &lab, folder.path(), &Silent, &options).unwrap();
+            assert_eq!(outcome.failures, []);
+            if !outcome.interrupted {
+                break;
+            }
+        }
+        let found = bytes(folder.path());
+        assert_same(&found, expected.get_or_insert(found.clone()), threads);
+    }
+}
+
+#[test]
+fn the_lab_says_what_is_exact_and_what_is_random() {
+    let lab = lab(&[]);
+    let plan = plan(&experiment(TINY), &lab).unwrap();
+    assert!(plan.notes.contains(&"penumbra: the reference is a closed form".to_owned()), "{:?}", plan.notes);
+    assert!(plan.notes.contains(&"cornell, halton:sheet: nothing random, so 1 replicate and no variance".to_owned()));
+    let canonical: Vec<&str> = plan.samplers.iter().map(|sampler| sampler.canonical.as_str()).collect();
+    assert_eq!(canonical, ["uniform:step:fresh@each", "stratified:sheet", "halton:sheet", "ld:shuffle:owen@each"]);
+    for text in canonical {
+        assert_eq!(lab.parse_sampler(text).as_deref(), Ok(text), "a canonical form reads as itself");
+    }
+    let error = lab.open_scene("nowhere").unwrap_err();
+    assert!(error.exit_code() == 2 && error.what.contains("nowhere.json"), "{error}");
+}
+
+/// 16 points of the (0,2)-sequence: D* = 11/64, proved in rationals (METHODS §0 point 6); it is a net with t = 0; no two
+/// of its points share a row of 1/16, and the sheet's shuffled set is the same set.
+#[test]
+fn every_metric_has_a_value_and_the_known_one_is_right() {
+    let lab = lab(&[]);
+    let names: Vec<String> = lab.point_metric_names().iter().map(|&name| name.to_owned()).collect();
+    let plain = lab.point_metrics("ld:plain", 16, 1, &names).unwrap();
+    assert_eq!(plain.len(), names.len());
+    assert!(plain.values().all(Option::is_some), "{plain:?}");
+    assert_eq!((plain["star"], plain["t_value"]), (Some(11.0 / 64.0), Some(0.0)));
+    assert!(plain["min_toroidal_distance"] >= Some(1.0 / 16.0));
+    assert_eq!(lab.point_metrics("ld:shuffle:none@each", 16, 2, &names).unwrap()["star"], plain["star"]);
+    let center = lab.point_metrics("center", 16, 1, &names).unwrap_err();
+    assert_eq!(center.exit_code(), 2, "{center}");
+}
+
+/// The closed form stands for the scene it was written for and for no other, whatever the file is called.
+#[test]
+fn an_edited_penumbra_has_no_closed_form() {
+    assert!(lab(&[]).open_scene("penumbra").unwrap().exact_reference);
+    assert!(lab(&["framebuffer.sppx=3", "camera.dir=[0, -8, 6]"]).open_scene("penumbra").unwrap().exact_reference);
+    assert!(!lab(&[]).open_scene("cornell").unwrap().exact_reference);
+    for set in [
+        "camera.fov=63",
+        "camera.pos=[0, 0.9375, -1.2]",
+        "camera.up=[0.1, 1, 0]",
+        "camera.lens_radius=0.1",
+        "shading=albedo",
+        "scene.materials=[{\"name\": \"light\", \"emissive_strength\": 11}]",
+        "scene.materials=[{\"name\": \"plane\", \"albedo_col\": [0.75, 0.75, 0.7]}]",
+        "scene.mesh_files=[\"penumbra/penumbra.obj\", \"cornell/cornell.obj\"]",
+    ] {
+        assert!(!lab(&[set]).open_scene("penumbra").unwrap().exact_reference, "{set}");
+    }
+}
+
+/// Renderer against closed form, through the runner: the mean signed error of 24 independent uniform images of
+/// `penumbra` is 0. Student's t, one test, false alarm 1 in 10⁶.
+#[test]
+fn uniform_images_scatter_about_the_exact_one() {
+    let text = TINY
+        .replace("\"cornell\", ", "")
+        .replace("[\"uniform\", \"stratified:sheet\", \"halton:sheet\", \"ld:best\"]", "[\"uniform\"]")
+        .replace("[1, 5]", "[16]")
+        .replace("\"spp\": [16], \"replicates\": 3", "\"spp\": [16], \"replicates\": 24");
+    let lab = lab(&[]);
+    let folder = tempfile::tempdir().unwrap();
+    execute(&plan(&experiment(&text), &lab).unwrap(), &lab, folder.path(), &Silent, &options())
+        .unwrap()
+        .check()
+        .unwrap();
+    let biases: Vec<f64> = rows(folder.path())
+        .into_iter()
+        .filter_map(|row| match row {
+            Row::Image(row) if row.kind == Kind::Render => row.errors.map(|errors| errors.bias),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(biases.len(), 24);
+    let verdict = t_test(&biases, 0.0, Family { tests: 1, false_alarm: 1e-6 });
+    assert!(verdict.holds(), "{verdict}");
 }

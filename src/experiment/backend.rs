@@ -10,6 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
 use crate::film::Image;
+pub use crate::scene::compile::Stage;
+pub use crate::scene::config::Estimator;
 
 /// Width and height of an image in pixels, written `WxH`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -71,52 +73,39 @@ impl From<Size> for String {
     }
 }
 
-/// How one light of several is weighted (SPEC §3).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Estimator {
-    /// Divides by the probability of the choice.
-    Unbiased,
-    /// The sheet's shortcut: leaves the division out.
-    Sheet,
-}
+/// [`Estimator`] as the word of its files: `#[serde(with = "estimator_word")]`.
+pub(super) mod estimator_word {
+    use serde::{Deserialize, Deserializer, Serializer};
 
-impl Estimator {
-    /// The name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Unbiased => "unbiased",
-            Self::Sheet => "sheet",
-        }
+    use super::Estimator;
+
+    pub fn serialize<S: Serializer>(estimator: &Estimator, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(estimator.name())
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Estimator, D::Error> {
+        let word = String::deserialize(deserializer)?;
+        Estimator::from_name(&word)
+            .ok_or_else(|| serde::de::Error::custom(format!("expected an estimator, found {word:?}")))
     }
 }
 
-/// The four pictures of the sheet's Figure 1, each with one decision more than the one before.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Stage {
-    /// Pixel centres and albedo: nothing is sampled.
-    Start,
-    /// And a sampled pixel.
-    Aa,
-    /// And a sampled lens.
-    Dof,
-    /// And a sampled area light: the full picture.
-    Final,
-}
+/// [`Stage`] as its word: `#[serde(with = "stage_word")]`.
+pub(super) mod stage_word {
+    use serde::{Deserialize, Deserializer, Serializer};
 
-impl Stage {
-    /// All four, in the order of the sheet.
-    pub const ALL: [Self; 4] = [Self::Start, Self::Aa, Self::Dof, Self::Final];
+    use super::Stage;
 
-    /// The name in files and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Start => "start",
-            Self::Aa => "aa",
-            Self::Dof => "dof",
-            Self::Final => "final",
-        }
+    pub fn serialize<S: Serializer>(stage: &Stage, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(stage.name())
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Stage, D::Error> {
+        let word = String::deserialize(deserializer)?;
+        Stage::ALL
+            .into_iter()
+            .find(|stage| stage.name() == word)
+            .ok_or_else(|| serde::de::Error::custom(format!("expected a stage, found {word:?}")))
     }
 }
 
@@ -220,6 +209,10 @@ pub trait Backend {
     /// # Errors
     /// Kind `Incomplete` where a sample is not finite, naming its pixel and sample index.
     fn render(&self, request: &RenderRequest) -> Result<Image>;
+
+    /// Distance of the plane of focus in an image of this size, scene units; `None` for a pinhole. With auto focus it
+    /// depends on the image's shape.
+    fn focal_depth(&self, scene: &str, size: Size) -> Option<f64>;
 
     /// The exact image of a scene whose facts say that there is one.
     ///

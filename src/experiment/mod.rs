@@ -9,9 +9,11 @@
 //! | rows | [`results`] | typed lines of `results.jsonl` |
 
 pub mod backend;
+mod exact;
 pub mod execute;
 pub mod identity;
 mod images;
+pub mod lab;
 mod machine;
 mod measure;
 pub mod plan;

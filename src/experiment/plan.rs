@@ -633,7 +633,8 @@ impl Planner<'_> {
             };
             self.add_image(scene, work);
         }
-        for stage in Stage::ALL {
+        // Without a lens there is nothing that its stage would add.
+        for stage in Stage::ALL.into_iter().filter(|&stage| scene.lens || stage != Stage::Dof) {
             self.add_stage(scene, pictures.size, stage);
         }
     }

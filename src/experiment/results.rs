@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::backend::{Estimator, PointMetrics, SceneFacts, Size, Stage};
+pub use super::backend::{Estimator, PointMetrics, SceneFacts, Size, Stage};
+use super::backend::{estimator_word, stage_word};
 
 use super::spec::Experiment;
 use crate::error::{Error, Result};
@@ -124,8 +125,10 @@ pub struct ImageRow {
     #[serde(serialize_with = "decimal", deserialize_with = "from_decimal")]
     pub seed: u64,
     /// Light estimator.
+    #[serde(with = "estimator_word")]
     pub estimator: Estimator,
     /// How much of the picture is sampled.
+    #[serde(with = "stage_word")]
     pub stage: Stage,
     /// Image size.
     pub size: Size,
@@ -155,6 +158,8 @@ pub struct ReferenceRow {
     pub spp: Option<Count>,
     /// Image size.
     pub size: Size,
+    /// Distance of the plane of focus in images of this scene and size, scene units; null for a pinhole.
+    pub focal_depth: Option<f64>,
     /// Ids of the two halves; null for a closed form.
     pub halves: Option<[String; 2]>,
     /// Algorithm number of the metrics.
@@ -185,6 +190,7 @@ pub struct EnsembleRow {
     /// Samples per pixel.
     pub spp: Count,
     /// Light estimator.
+    #[serde(with = "estimator_word")]
     pub estimator: Estimator,
     /// Image size.
     pub size: Size,

@@ -17,12 +17,12 @@
 //! | `points` | optional: `{"n", "metrics", "replicates"}`: point-set metrics of the same samplers |
 //! | `pictures` | optional: `{"scene", "size", "spp", "reference_spp"}`: images to look at; `reference_spp` defaults to the reference's |
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::backend::{Estimator, Size};
+use super::backend::{Estimator, Size, estimator_word};
 use crate::error::{Error, Result};
 use crate::scene::json::{self, Item, Value, suggestion};
 
@@ -55,6 +55,7 @@ pub struct Experiment {
     /// What images are compared with.
     pub reference: Reference,
     /// Light estimator of the compared images.
+    #[serde(with = "estimator_word")]
     pub estimator: Estimator,
     /// Point-set metrics.
     pub points: Option<Points>,
@@ -72,7 +73,7 @@ pub enum Sizes {
     /// One size for all scenes.
     All(Size),
     /// A size for each scene named; the others keep their file's own.
-    PerScene(Vec<(String, Size)>),
+    PerScene(BTreeMap<String, Size>),
 }
 
 impl Sizes {
@@ -80,7 +81,7 @@ impl Sizes {
     pub fn of(&self, scene: &str, own: Size) -> Size {
         match self {
             Self::All(size) => *size,
-            Self::PerScene(sizes) => sizes.iter().find(|(name, _)| name == scene).map_or(own, |(_, size)| *size),
+            Self::PerScene(sizes) => sizes.get(scene).copied().unwrap_or(own),
         }
     }
 }
@@ -136,7 +137,7 @@ impl Experiment {
         let name = fields.need("name", name)?;
         let seed = fields.need("seed", |item| item.integer(0..=u64::MAX))?;
         let scenes = fields.need("scenes", |item| texts(&item, "scene names"))?;
-        let size = fields.or("size", Sizes::PerScene(Vec::new()), |item| sizes(&item, &scenes))?;
+        let size = fields.or("size", Sizes::PerScene(BTreeMap::new()), |item| sizes(&item, &scenes))?;
         let samplers = fields.need("samplers", |item| texts(&item, "samplers"))?;
         let spp = fields.need("spp", |item| counts(&item, MOST_SPP))?;
         let replicates = fields.need("replicates", |item| count(&item, MOST_REPLICATES))?;

@@ -1,0 +1,251 @@
+//! The lab's own backend: scene files, the renderer, the samplers, the closed forms and the point-set metrics.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::backend::{Algorithms, Backend, PointMetrics, RenderRequest, SceneFacts, Size};
+use super::exact;
+use crate::error::{Error, Result};
+use crate::film::Image;
+use crate::render;
+use crate::sampling::{self, Preset, SampleLayout, Sampler, SamplerSet, SamplerSpec, point_set};
+use crate::scene::compile::{Scene, Stage};
+use crate::scene::load::{self, LoadedScene, OpenOptions};
+use crate::stats::discrepancy::{L2Kind, Points, l2_root, min_toroidal_distance, star_2d, t_value};
+
+/// Raised whenever the bits of image errors or point-set metrics may change.
+pub const METRICS_ALGORITHM: u32 = 1;
+
+/// Raised whenever the weighting of lights changes.
+pub const ESTIMATOR_ALGORITHM: u32 = 1;
+
+/// The names of point-set metrics.
+pub const POINT_METRICS: [&str; 12] = [
+    "star",
+    "l2_star",
+    "centred_l2",
+    "wrap_around_l2",
+    "mixture_l2",
+    "modified_l2",
+    "extreme_l2",
+    "symmetric_l2",
+    "periodic_l2",
+    "diaphony",
+    "t_value",
+    "min_toroidal_distance",
+];
+
+/// A scene in memory at the busiest moment, in sizes of itself: the mesh as loaded, the full scene, that of one stage,
+/// and what building a tree needs meanwhile.
+const SCENE_COPIES: u64 = 5;
+
+/// A scene that was opened.
+struct Opened {
+    loaded: LoadedScene,
+    /// Decisions of the full picture.
+    layout: SampleLayout,
+    /// By stage: the full scene always, one other at the most.
+    compiled: HashMap<&'static str, Scene>,
+}
+
+/// Renders with the lab.
+pub struct Lab {
+    /// Folders in which a bare scene name is looked for.
+    folders: Vec<PathBuf>,
+    options: OpenOptions,
+    scenes: RefCell<HashMap<String, Opened>>,
+    pools: RefCell<HashMap<usize, Arc<rayon::ThreadPool>>>,
+}
+
+impl Lab {
+    /// A lab for the experiment file at `experiment`: scene names are looked for beside it, in the folder above (so
+    /// `configs/experiments/a.json` finds `configs/`), and in `configs/`.
+    pub fn new(experiment: &Path, options: OpenOptions) -> Self {
+        let beside = experiment.parent().unwrap_or(Path::new(""));
+        let folders = vec![beside.to_owned(), beside.join(".."), PathBuf::from("configs")];
+        Self { folders, options, scenes: RefCell::default(), pools: RefCell::default() }
+    }
+
+    /// What a person should know of the scenes opened so far, one line each.
+    pub fn warnings(&self) -> Vec<String> {
+        let scenes = self.scenes.borrow();
+        let mut lines: Vec<String> = scenes
+            .iter()
+            .flat_map(|(name, opened)| opened.loaded.warnings.iter().map(move |line| format!("{name}: {line}")))
+            .collect();
+        lines.sort();
+        lines
+    }
+
+    /// Where the file of a scene is.
+    fn find(&self, scene: &str) -> Result<PathBuf> {
+        let (name, mut places) = match scene.ends_with(".json") {
+            true => (scene.to_owned(), vec![PathBuf::from(scene)]),
+            false => (format!("{scene}.json"), Vec::new()),
+        };
+        places.extend(self.folders.iter().map(|folder| folder.join(&name)));
+        match places.iter().find(|place| place.is_file()) {
+            Some(place) => Ok(place.clone()),
+            None => {
+                let places: Vec<String> = places.iter().map(|place| place.display().to_string()).collect();
+                let what = format!("expected a scene file, found none at {}", places.join(", "));
+                Err(Error::input(format!("scene {scene:?}"), what))
+            }
+        }
+    }
+
+    /// Threads to render with, kept from image to image.
+    fn pool(&self, threads: usize) -> Result<Arc<rayon::ThreadPool>> {
+        let mut pools = self.pools.borrow_mut();
+        if let Some(pool) = pools.get(&threads) {
+            return Ok(pool.clone());
+        }
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool =
+            pool.map_err(|e| Error::input("--threads", format!("expected {threads} threads to start, found: {e}")))?;
+        let pool = Arc::new(pool);
+        pools.insert(threads, pool.clone());
+        Ok(pool)
+    }
+
+    /// Looks at an open scene.
+    fn with<T>(&self, scene: &str, look: impl FnOnce(&Opened) -> T) -> T {
+        let scenes = self.scenes.borrow();
+        look(scenes.get(scene).expect("a plan asks for scenes that it opened"))
+    }
+}
+
+/// The sampler of a canonical text.
+fn spec(canonical: &str) -> Result<SamplerSpec> {
+    SamplerSpec::parse(canonical, Preset::Best)
+}
+
+impl Backend for Lab {
+    fn open_scene(&self, scene: &str) -> Result<SceneFacts> {
+        let path = self.find(scene)?;
+        let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        let loaded = load::open(&path, &self.options)?;
+        let framebuffer = loaded.config.framebuffer;
+        let size = Size { width: framebuffer.res_w, height: framebuffer.res_h };
+        let full = Scene::new(&loaded.config, loaded.mesh.clone(), (size.width, size.height), Stage::Final)?;
+        let facts = SceneFacts {
+            name: name.clone(),
+            content_hash: loaded.content_sha256(),
+            size,
+            spp: framebuffer.sppx,
+            layout: full.layout.to_string(),
+            exact_reference: exact::closed_form(&loaded, size).is_some(),
+            lens: full.focal_depth().is_some(),
+            memory_bytes: SCENE_COPIES * full.bytes() as u64,
+        };
+        let layout = full.layout.clone();
+        let compiled = HashMap::from([(Stage::Final.name(), full)]);
+        self.scenes.borrow_mut().insert(name, Opened { loaded, layout, compiled });
+        Ok(facts)
+    }
+
+    fn parse_sampler(&self, text: &str) -> Result<String> {
+        let spec = spec(text)?;
+        // The sheet's presets read 1-D decisions another way, which only their own name says.
+        Ok(if spec.sheet_1d { format!("{}:sheet", spec.points.word()) } else { spec.expansion() })
+    }
+
+    fn is_random(&self, canonical: &str, scene: Option<&str>) -> bool {
+        spec(canonical).is_ok_and(|spec| match scene {
+            Some(scene) => self.with(scene, |opened| SamplerSet::from(spec).is_random(&opened.layout)),
+            None => spec.is_random(),
+        })
+    }
+
+    fn taken(&self, canonical: &str, scene: Option<&str>, asked: u32) -> u32 {
+        spec(canonical).map_or(asked, |spec| match scene {
+            Some(scene) => self.with(scene, |opened| SamplerSet::from(spec).taken(asked, &opened.layout)),
+            None => spec.taken(asked),
+        })
+    }
+
+    fn algorithms(&self, _: &str) -> Algorithms {
+        Algorithms {
+            renderer: render::ALGORITHM,
+            sampler: sampling::ALGORITHM,
+            estimator: ESTIMATOR_ALGORITHM,
+            exact: exact::ALGORITHM,
+            metrics: METRICS_ALGORITHM,
+        }
+    }
+
+    fn prepare(&self, request: &RenderRequest) -> Result<()> {
+        self.pool(request.threads)?;
+        let mut scenes = self.scenes.borrow_mut();
+        let opened = scenes.get_mut(request.scene).expect("a plan asks for scenes that it opened");
+        let size = (request.size.width, request.size.height);
+        opened.compiled.retain(|&stage, _| stage == Stage::Final.name() || stage == request.stage.name());
+        let scene = match opened.compiled.entry(request.stage.name()) {
+            std::collections::hash_map::Entry::Occupied(entry) => entry.into_mut(),
+            std::collections::hash_map::Entry::Vacant(entry) => {
+                entry.insert(Scene::new(&opened.loaded.config, opened.loaded.mesh.clone(), size, request.stage)?)
+            }
+        };
+        scene.resize(size);
+        scene.estimator = request.estimator;
+        Ok(())
+    }
+
+    fn render(&self, request: &RenderRequest) -> Result<Image> {
+        self.prepare(request)?;
+        let pool = self.pool(request.threads)?;
+        let spec = spec(request.sampler)?;
+        self.with(request.scene, |opened| {
+            let scene = &opened.compiled[request.stage.name()];
+            let sampler = Sampler::new(spec, &scene.layout, request.spp, request.seed)?;
+            let rendered = pool.install(|| render::render(scene, &sampler));
+            rendered.map(|rendered| rendered.image).map_err(|bad| Error::incomplete(request.scene, bad))
+        })
+    }
+
+    fn focal_depth(&self, scene: &str, size: Size) -> Option<f64> {
+        let mut scenes = self.scenes.borrow_mut();
+        let full = scenes.get_mut(scene)?.compiled.get_mut(Stage::Final.name())?;
+        full.resize((size.width, size.height));
+        full.focal_depth().map(f64::from)
+    }
+
+    fn exact_reference(&self, scene: &str, size: Size) -> Result<Image> {
+        match self.with(scene, |opened| exact::closed_form(&opened.loaded, size)) {
+            Some(exact) => exact::image(&exact, size),
+            None => Err(Error::incomplete(scene, format!("expected a closed form at {size}, found none"))),
+        }
+    }
+
+    fn point_metric_names(&self) -> &'static [&'static str] {
+        &POINT_METRICS
+    }
+
+    fn point_metrics(&self, canonical: &str, n: u32, seed: u64, metrics: &[String]) -> Result<PointMetrics> {
+        let set = point_set(spec(canonical)?, n, seed)?;
+        let points = Points::new_2d(&set).map_err(|e| Error::incomplete(canonical, e))?;
+        metrics.iter().map(|name| Ok((name.clone(), point_metric(name, &points)?))).collect()
+    }
+}
+
+/// One metric of a set in the plane; roots of the L2 kinds.
+fn point_metric(name: &str, points: &Points) -> Result<Option<f64>> {
+    let l2 = |kind| Ok(l2_root(points, kind));
+    match name {
+        "star" => Ok(Some(star_2d(points).value)),
+        "t_value" => Ok(t_value(points).map(f64::from)),
+        "min_toroidal_distance" => Ok(min_toroidal_distance(points)),
+        "l2_star" => l2(L2Kind::Star),
+        "centred_l2" => l2(L2Kind::Centred),
+        "wrap_around_l2" => l2(L2Kind::WrapAround),
+        "mixture_l2" => l2(L2Kind::Mixture),
+        "modified_l2" => l2(L2Kind::Modified),
+        "extreme_l2" => l2(L2Kind::Extreme),
+        "symmetric_l2" => l2(L2Kind::Symmetric),
+        "periodic_l2" => l2(L2Kind::Periodic),
+        "diaphony" => l2(L2Kind::Diaphony),
+        _ => Err(Error::input(name, format!("expected one of the metrics {}", POINT_METRICS.join(" ")))),
+    }
+}
