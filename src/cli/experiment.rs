@@ -64,12 +64,11 @@ impl Run {
         let bar = Bar::new(self.work.quiet);
         let outcome = execute(&plan, &lab, &out, &bar, &options)?;
         bar.bar.finish_and_clear();
-        let report = report::write(&out)?;
-        self.work.warn(&report.warnings);
+        let written = report::write(&out)?;
         if self.json {
             print_json(&json!({
                 "folder": out.display().to_string(),
-                "report": report.path.display().to_string(),
+                "report": written.report.display().to_string(),
                 "items": outcome.items,
                 "found": outcome.found,
                 "done": outcome.done,
@@ -84,7 +83,7 @@ impl Run {
                 outcome.done,
                 outcome.failures.len()
             );
-            eprintln!("report: {}", report.path.display());
+            eprintln!("report: {}", written.report.display());
         }
         outcome.check()
     }
@@ -128,14 +127,11 @@ pub struct Report {
 impl Report {
     /// Rewrites the report.
     pub fn run(self) -> Result<()> {
-        let report = report::write(&self.folder)?;
+        let written = report::write(&self.folder)?;
         if !self.quiet {
-            for warning in &report.warnings {
-                eprintln!("note: {warning}");
-            }
-            eprintln!("report: {}", report.path.display());
+            eprintln!("report: {}", written.report.display());
         }
-        Ok(())
+        written.check()
     }
 }
 
