@@ -211,7 +211,7 @@ fn scaling_all_lengths_by_a_power_of_two_changes_no_bit() {
             pos: camera.pos * scale,
             lens_radius: camera.lens_radius * scale,
             focal_depth: camera.focal_depth * scale,
-            ..camera.clone()
+            ..camera
         };
         rendered(&room.scaled(scale).scene(&camera, (16, 12), Stage::Final), spec("sobol"), 8, 3)
     };

@@ -343,8 +343,8 @@ const BEST: [&str; 6] = ["uniform:best", "stratified:best", "halton:best", "hamm
 
 /// E f(u) g(v) against E f · E g for all pairs of coordinates of two decisions (correlation 12 (u − ½)(v − ½), zero), pixel
 /// and lens, pixel and light, lens and light, and light pick against light point: a shared sequence gives up to 1.
-/// 6 samplers × 14 pairs × 2 counts at a family-wise false-alarm rate of 1e-7; a correlation of (6.2 + 2.3)/√(4000 (n − 1)),
-/// 0.08 for n = 4, is caught (n − 1 since two random orders of the same strata are tied by one sum).
+/// 6 samplers × 14 pairs × 2 counts at a family-wise false-alarm rate of 1e-7. However the n samples of a set hang together,
+/// its mean spreads by no more than one sample, so a correlation of (6.2 + 2.3)/√4000 = 0.14 is caught for any of them.
 #[test]
 fn decisions_of_the_best_presets_are_decoupled() {
     let t = tickets();
@@ -374,7 +374,7 @@ fn decisions_of_the_best_presets_are_decoupled() {
             for (pair, replicates) in sums.iter().enumerate() {
                 let verdict = t_test(replicates, 0.0, family);
                 assert!(verdict.holds(), "{name}, n = {n}, pair {pair}: {verdict}");
-                assert!(verdict.detects.unwrap() < 0.08, "{name}: {verdict}");
+                assert!(verdict.detects.unwrap() < 0.14, "{name}: {verdict}");
             }
         }
     }

@@ -69,7 +69,7 @@ impl Room {
 
     pub fn scene_with(&self, camera: &CameraConfig, size: (u32, u32), stage: Stage, estimator: Estimator) -> Scene {
         let mut config = SceneConfig::parse(b"{}", "memory", &[]).unwrap();
-        config.camera = camera.clone();
+        config.camera = *camera;
         config.auto_focus = false;
         config.estimator = estimator;
         Scene::new(&config, self.mesh.clone(), size, stage).unwrap()
