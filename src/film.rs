@@ -25,11 +25,17 @@ impl Image {
     }
 }
 
-/// Writes `bytes` under a temporary name beside `path`, then renames it: a reader sees the old file or the whole new one.
+/// Writes `bytes` under a temporary name beside `path`, then renames it: a reader sees the old file or the whole new one,
+/// also after a loss of power.
 ///
 /// # Errors
 /// Kind [`ErrorKind::Write`](crate::error::ErrorKind::Write) with the system's reason.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_renamed(path, bytes, true)
+}
+
+/// As [`write_whole`], forcing the bytes to disk before the renaming where `durable`.
+fn write_renamed(path: &Path, bytes: &[u8], durable: bool) -> Result<()> {
     let fail = |e: std::io::Error| Error::write(path, format!("cannot write: {e}"));
     if let Some(folder) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder).map_err(fail)?;
@@ -40,7 +46,9 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     let written = (|| {
         let mut file = std::fs::File::create(partial)?;
         file.write_all(bytes)?;
-        file.sync_data()?;
+        if durable {
+            file.sync_data()?;
+        }
         std::fs::rename(partial, path)
     })();
     if written.is_err() {
@@ -54,6 +62,9 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
 const ATTRIBUTE_PREFIX: &str = "sampler_lab.";
 
 /// Writes a lossless OpenEXR image, `f32` channels R G B, with `provenance` as text attributes `sampler_lab.*`.
+///
+/// The same image and provenance give the same bytes. Not forced to disk: after a loss of power the file may be torn, which
+/// its reader notices.
 ///
 /// # Errors
 /// Kind `Write` where the file cannot be written.
@@ -76,7 +87,32 @@ pub fn write_exr(path: &Path, image: &Image, provenance: &[(String, String)]) ->
         .non_parallel()
         .to_buffered(&mut bytes)
         .map_err(|e| Error::write(path, format!("cannot encode EXR: {e}")))?;
-    write_whole(path, bytes.get_ref())
+    let bytes = with_sorted_attributes(bytes.into_inner())
+        .ok_or_else(|| Error::write(path, "cannot encode EXR: its header does not read back"))?;
+    write_renamed(path, &bytes, false)
+}
+
+/// Puts the attributes of a single-part OpenEXR file into the order of their names.
+///
+/// The encoder keeps custom attributes in a randomly seeded map; the format gives their order no meaning, and the header's
+/// length, which offsets count from, stays. Layout: magic and version (8 bytes), then name\0 type\0 size:i32 value, until an
+/// empty name. `None` where the bytes are not of that form.
+fn with_sorted_attributes(mut bytes: Vec<u8>) -> Option<Vec<u8>> {
+    const START: usize = 8;
+    let mut attributes: Vec<Vec<u8>> = Vec::new();
+    let mut at = START;
+    while *bytes.get(at)? != 0 {
+        let name_end = at + bytes[at..].iter().position(|&b| b == 0)?;
+        let type_end = name_end + 1 + bytes[name_end + 1..].iter().position(|&b| b == 0)?;
+        let size = i32::from_le_bytes(bytes.get(type_end + 1..type_end + 5)?.try_into().ok()?);
+        let end = type_end + 5 + usize::try_from(size).ok()?;
+        attributes.push(bytes.get(at..end)?.to_vec());
+        at = end;
+    }
+    attributes.sort();
+    let sorted = attributes.concat();
+    bytes[START..START + sorted.len()].copy_from_slice(&sorted);
+    Some(bytes)
 }
 
 /// Reads the R, G and B channels of an OpenEXR image and its `sampler_lab.*` attributes.
@@ -187,8 +223,14 @@ mod tests {
         for (i, p) in image.pixels.iter_mut().enumerate() {
             *p = [i as f32 * 0.1, 1e-30, 3e9 + i as f32];
         }
-        let provenance = vec![("seed".to_owned(), "7".to_owned()), ("version".to_owned(), "0".to_owned())];
+        let provenance: Vec<_> =
+            ["sampler", "scene", "seed", "spp", "version"].map(|n| (n.to_owned(), format!("{n} 7"))).to_vec();
         write_exr(&path, &image, &provenance).unwrap();
+        let first = std::fs::read(&path).unwrap();
+        for _ in 0..4 {
+            write_exr(&path, &image, &provenance).unwrap();
+            assert_eq!(std::fs::read(&path).unwrap(), first, "the same image and provenance give the same bytes");
+        }
         assert_eq!(read_exr(&path).unwrap(), (image, provenance));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no partial file is left");
     }

@@ -4,6 +4,7 @@ pub mod analytic;
 pub mod error;
 pub mod experiment;
 pub mod film;
+pub mod points;
 pub mod render;
 pub mod report;
 pub mod sampling;

@@ -127,6 +127,10 @@ impl Backend for Toy {
         Ok(image)
     }
 
+    fn focal_depth(&self, scene: &str, _: Size) -> Option<f64> {
+        (scene == "ramp").then_some(4.5)
+    }
+
     fn exact_reference(&self, scene: &str, size: Size) -> Result<Image> {
         self.rendered.borrow_mut().push((scene.to_owned(), "closed form".to_owned(), 0, 0));
         Ok(truth(size))
@@ -229,6 +233,24 @@ fn the_experiments_that_come_with_the_lab_read() {
         let experiment = Experiment::read(&path).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(path.file_stem().unwrap().to_str(), Some(experiment.name.as_str()));
     }
+}
+
+/// Whatever one slip of the hand makes of a file, the answer is an experiment or a message, never a panic.
+#[test]
+fn no_byte_left_out_or_put_in_upsets_the_reader() {
+    let mut refused = 0;
+    for at in 0..SMALL.len() {
+        for slip in [&b""[..], b"\"", b"-", b"9", b"{", b"\xff"] {
+            let mut text = SMALL.as_bytes().to_vec();
+            text.splice(at..=at, slip.iter().copied());
+            let read = json::parse(&text, "small.json").and_then(|value| Experiment::from_value(&value, "small.json"));
+            if let Err(error) = read {
+                assert!(error.exit_code() == 2 && error.place.starts_with("small.json"), "{error}");
+                refused += 1;
+            }
+        }
+    }
+    assert!(refused > SMALL.len(), "{refused}");
 }
 
 // --- plans ---
@@ -398,7 +420,10 @@ fn rows_are_in_plan_order_and_complete() {
                 assert_eq!(row.replicates, if is_random { 3 } else { 1 });
                 assert_eq!(row.variance.is_some(), is_random, "nothing random has no variance");
             }
-            Row::Reference(row) => assert_eq!(row.noise_mse == 0.0, row.scene == "exact"),
+            Row::Reference(row) => {
+                assert_eq!(row.noise_mse == 0.0, row.scene == "exact");
+                assert_eq!(row.focal_depth, (row.scene == "ramp").then_some(4.5), "what auto focus found is recorded");
+            }
             Row::Image(row) if row.sampler == "fresh:step" => assert_eq!(row.names, ["fresh:sheet", "fresh:best"]),
             Row::Image(_) | Row::Points(_) => {}
         }
@@ -706,6 +731,19 @@ fn a_stop_from_elsewhere_ends_after_the_item_at_hand() {
 }
 
 #[test]
+fn a_folder_that_cannot_be_written_is_a_writing_error_and_nothing_is_rendered() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("a-file");
+    std::fs::write(&file, "mine").unwrap();
+    let toy = Toy::new();
+    for out in [file.clone(), file.join("below")] {
+        let error = execute(&small(&toy), &toy, &out, &Silent, &options()).unwrap_err();
+        assert_eq!(error.exit_code(), 3, "{error}");
+    }
+    assert_eq!((toy.renders(), std::fs::read(&file).unwrap()), (0, b"mine".to_vec()));
+}
+
+#[test]
 fn two_runs_in_one_folder_are_refused() {
     let folder = tempfile::tempdir().unwrap();
 
@@ -844,6 +882,22 @@ fn the_lab_says_what_is_exact_and_what_is_random() {
     }
     let error = lab.open_scene("nowhere").unwrap_err();
     assert!(error.exit_code() == 2 && error.what.contains("nowhere.json"), "{error}");
+}
+
+/// 16 points of the (0,2)-sequence: D* = 11/64, proved in rationals (METHODS §0 point 6); it is a net with t = 0; no two
+/// of its points share a row of 1/16, and the sheet's shuffled set is the same set.
+#[test]
+fn every_metric_has_a_value_and_the_known_one_is_right() {
+    let lab = lab(&[]);
+    let names: Vec<String> = lab.point_metric_names().iter().map(|&name| name.to_owned()).collect();
+    let plain = lab.point_metrics("ld:plain", 16, 1, &names).unwrap();
+    assert_eq!(plain.len(), names.len());
+    assert!(plain.values().all(Option::is_some), "{plain:?}");
+    assert_eq!((plain["star"], plain["t_value"]), (Some(11.0 / 64.0), Some(0.0)));
+    assert!(plain["min_toroidal_distance"] >= Some(1.0 / 16.0));
+    assert_eq!(lab.point_metrics("ld:shuffle:none@each", 16, 2, &names).unwrap()["star"], plain["star"]);
+    let center = lab.point_metrics("center", 16, 1, &names).unwrap_err();
+    assert_eq!(center.exit_code(), 2, "{center}");
 }
 
 /// The closed form stands for the scene it was written for and for no other, whatever the file is called.

@@ -8,6 +8,9 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use sampler_lab::analytic::Penumbra;
+use sampler_lab::scene::compile::{Scene, Stage};
+use sampler_lab::scene::light::LightSet;
+use sampler_lab::scene::load::{OpenOptions, open};
 
 /// The scenes' names: `data/NAME/NAME.obj`.
 const SCENES: [&str; 3] = ["checkerpots", "cornell", "penumbra"];
@@ -15,6 +18,13 @@ const SCENES: [&str; 3] = ["checkerpots", "cornell", "penumbra"];
 /// The folder of committed scenes.
 fn data() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("data")
+}
+
+/// The config `configs/NAME.json`, loaded and compiled for an image of `size`, and what the loader had to say.
+fn compiled(name: &str, size: (u32, u32)) -> (Scene, Vec<String>) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(format!("{name}.json"));
+    let loaded = open(&path, &OpenOptions::default()).unwrap();
+    (Scene::new(&loaded.config, loaded.mesh, size, Stage::Final).unwrap(), loaded.warnings)
 }
 
 /// One triangle as it stands in a file.
@@ -430,4 +440,28 @@ fn penumbra_s_plane_fills_the_picture_and_its_camera_is_the_closed_form_s() {
     assert_eq!(config["camera"]["fov"].as_f64(), Some(camera.fov_y_degrees));
     assert_eq!(config["camera"]["lens_radius"].as_f64(), Some(0.0));
     assert_eq!(config["scene"]["materials"][0]["emissive_strength"].as_f64(), Some(closed_form.light().emission));
+}
+
+#[test]
+fn every_config_loads_with_its_light_as_the_only_thing_to_say() {
+    for (name, mesh, radiance) in
+        [("a01", "checkerpots", 15.0), ("cornell", "cornell", 15.0), ("penumbra", "penumbra", 10.0)]
+    {
+        let (scene, said) = compiled(name, (32, 18));
+        let [emitter] = &said[..] else { panic!("{name}: {said:?}") };
+        assert!(emitter.contains("\"light\" emits"), "{name}: {emitter}");
+        assert_eq!(scene.warnings, Vec::<String>::new(), "{name}");
+        let triangles: usize = objects(mesh).iter().map(|o| o.triangles.len()).sum();
+        assert_eq!(scene.mesh.len(), triangles, "{name}: what the loader sees is what stands in the file");
+        let Some(LightSet::One { light, .. }) = &scene.lights else { panic!("{name}: {:?}", scene.lights) };
+        assert_eq!(light.emission.to_array(), [radiance; 3], "{name}");
+    }
+}
+
+#[test]
+fn auto_focus_in_a01_finds_the_sheet_s_focal_depth() {
+    let (scene, _) = compiled("a01", (1280, 720));
+    let found = scene.focal_depth().unwrap();
+    // Off by 0.01, a point at depth 4.8 blurs to a disc of radius 0.3 · 0.01 / 4.8, which is 0.07 pixels.
+    assert!((found - 4.8008).abs() < 0.01, "{found}");
 }

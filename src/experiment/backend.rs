@@ -210,6 +210,10 @@ pub trait Backend {
     /// Kind `Incomplete` where a sample is not finite, naming its pixel and sample index.
     fn render(&self, request: &RenderRequest) -> Result<Image>;
 
+    /// Distance of the plane of focus in an image of this size, scene units; `None` for a pinhole. With auto focus it
+    /// depends on the image's shape.
+    fn focal_depth(&self, scene: &str, size: Size) -> Option<f64>;
+
     /// The exact image of a scene whose facts say that there is one.
     ///
     /// # Errors

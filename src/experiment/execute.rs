@@ -360,6 +360,7 @@ impl<'a> Run<'a> {
             sampler,
             spp,
             size: work.size,
+            focal_depth: self.backend.focal_depth(&work.scene, work.size),
             halves,
             metrics_algorithm: item.metrics_algorithm,
             noise_mse: reference.noise_mse(),

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::film::Image;
 use crate::render;
 use crate::sampling::{self, Preset, SampleLayout, Sampler, SamplerSet, SamplerSpec, point_set};
-use crate::scene::compile::{Scene, Stage, content_hash};
+use crate::scene::compile::{Scene, Stage};
 use crate::scene::load::{self, LoadedScene, OpenOptions};
 use crate::stats::discrepancy::{L2Kind, Points, l2_root, min_toroidal_distance, star_2d, t_value};
 
@@ -37,11 +37,16 @@ pub const POINT_METRICS: [&str; 12] = [
     "min_toroidal_distance",
 ];
 
+/// A scene in memory at the busiest moment, in sizes of itself: the mesh as loaded, the full scene, that of one stage,
+/// and what building a tree needs meanwhile.
+const SCENE_COPIES: u64 = 5;
+
 /// A scene that was opened.
 struct Opened {
     loaded: LoadedScene,
     /// Decisions of the full picture.
     layout: SampleLayout,
+    /// By stage: the full scene always, one other at the most.
     compiled: HashMap<&'static str, Scene>,
 }
 
@@ -127,13 +132,13 @@ impl Backend for Lab {
         let full = Scene::new(&loaded.config, loaded.mesh.clone(), (size.width, size.height), Stage::Final)?;
         let facts = SceneFacts {
             name: name.clone(),
-            content_hash: content_hash(&loaded),
+            content_hash: loaded.content_sha256(),
             size,
             spp: framebuffer.sppx,
             layout: full.layout.to_string(),
             exact_reference: exact::closed_form(&loaded, size).is_some(),
             lens: full.focal_depth().is_some(),
-            memory_bytes: 2 * full.bytes() as u64,
+            memory_bytes: SCENE_COPIES * full.bytes() as u64,
         };
         let layout = full.layout.clone();
         let compiled = HashMap::from([(Stage::Final.name(), full)]);
@@ -176,6 +181,7 @@ impl Backend for Lab {
         let mut scenes = self.scenes.borrow_mut();
         let opened = scenes.get_mut(request.scene).expect("a plan asks for scenes that it opened");
         let size = (request.size.width, request.size.height);
+        opened.compiled.retain(|&stage, _| stage == Stage::Final.name() || stage == request.stage.name());
         let scene = match opened.compiled.entry(request.stage.name()) {
             std::collections::hash_map::Entry::Occupied(entry) => entry.into_mut(),
             std::collections::hash_map::Entry::Vacant(entry) => {
@@ -197,6 +203,13 @@ impl Backend for Lab {
             let rendered = pool.install(|| render::render(scene, &sampler));
             rendered.map(|rendered| rendered.image).map_err(|bad| Error::incomplete(request.scene, bad))
         })
+    }
+
+    fn focal_depth(&self, scene: &str, size: Size) -> Option<f64> {
+        let mut scenes = self.scenes.borrow_mut();
+        let full = scenes.get_mut(scene)?.compiled.get_mut(Stage::Final.name())?;
+        full.resize((size.width, size.height));
+        full.focal_depth().map(f64::from)
     }
 
     fn exact_reference(&self, scene: &str, size: Size) -> Result<Image> {

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::backend::{Estimator, PointMetrics, SceneFacts, Size, Stage, estimator_word, stage_word};
+pub use super::backend::{Estimator, PointMetrics, SceneFacts, Size, Stage};
+use super::backend::{estimator_word, stage_word};
 
 use super::spec::Experiment;
 use crate::error::{Error, Result};
@@ -157,6 +158,8 @@ pub struct ReferenceRow {
     pub spp: Option<Count>,
     /// Image size.
     pub size: Size,
+    /// Distance of the plane of focus in images of this scene and size, scene units; null for a pinhole.
+    pub focal_depth: Option<f64>,
     /// Ids of the two halves; null for a closed form.
     pub halves: Option<[String; 2]>,
     /// Algorithm number of the metrics.

@@ -16,6 +16,9 @@ pub const STATED_RATE: f64 = 2e6;
 /// Pairs of points per second for point-set metrics.
 const PAIR_RATE: f64 = 2e8;
 
+/// Bytes that the program takes before it opens anything: code, threads, rows.
+const PROGRAM_BYTES: u64 = 32 << 20;
+
 /// Bytes of an image: three `f32` a pixel.
 const BYTES_A_PIXEL: u64 = 12;
 
@@ -212,7 +215,7 @@ fn rate(standing: &Standing, threads: usize) -> (f64, bool) {
     (if is_measured { measured } else { STATED_RATE } * threads.max(1) as f64, is_measured)
 }
 
-/// Bytes at the busiest moment: the images held then, work beside the largest, and all scenes.
+/// Bytes at the busiest moment: the program, the images held then, work beside the largest, and all scenes.
 fn memory_bytes(plan: &Plan) -> u64 {
     let pixels = |id: &str| plan.position(id).and_then(|at| plan.items[at].kept_image()).map_or(0, Size::pixels);
     let released = plan.released_after();
@@ -232,7 +235,7 @@ fn memory_bytes(plan: &Plan) -> u64 {
     }
     let largest = plan.items.iter().filter_map(WorkItem::kept_image).map(Size::pixels).max().unwrap_or(0);
     let scenes: u64 = plan.scenes.iter().map(|scene| scene.memory_bytes).sum();
-    most_pixels * BYTES_A_PIXEL + largest * WORK_BYTES_A_PIXEL + scenes
+    PROGRAM_BYTES + most_pixels * BYTES_A_PIXEL + largest * WORK_BYTES_A_PIXEL + scenes
 }
 
 /// Bytes for a reader.

@@ -4,6 +4,8 @@ use std::fmt;
 
 use crate::error::{Error, Result, did_you_mean};
 
+use super::layout::Claim;
+use super::radical::PRIMES;
 use super::strata::strata_taken;
 
 /// Largest number of samples per pixel, asked or taken.
@@ -293,6 +295,27 @@ impl SamplerSpec {
             text += " (1-D: strata, step:jitter@each)";
         }
         text
+    }
+
+    /// What the decision behind `claim` reads, in words: `Halton's bases 5 and 7`.
+    pub fn reads(&self, claim: Claim) -> String {
+        let one_d = claim.count == 1;
+        if self.sheet_1d && one_d {
+            return "n jittered strata on a line (the sheet's 1-D sampler)".to_owned();
+        }
+        let first = if self.order == Order::Joint { claim.first } else { 0 };
+        let axes: Vec<u32> = (first..first + claim.count).collect();
+        let list = |name: &dyn Fn(u32) -> String| axes.iter().map(|&a| name(a)).collect::<Vec<_>>().join(" and ");
+        let plural = if one_d { "" } else { "s" };
+        match self.points {
+            Points::Uniform => format!("uniform stream{plural} {}", list(&|a| a.to_string())),
+            Points::Stratified if one_d => "n jittered strata on a line".to_owned(),
+            Points::Stratified => "a×b = n jittered cells".to_owned(),
+            Points::Halton => format!("Halton's base{plural} {}", list(&|a| PRIMES[a as usize].to_string())),
+            Points::Hammersley => list(&|a| (if a == 0 { "i/n" } else { "φ₂(i)" }).to_owned()),
+            Points::Ld | Points::Sobol => format!("Sobol' dimension{plural} {}", list(&|a| (a + 1).to_string())),
+            Points::Center => "the centre: no numbers".to_owned(),
+        }
     }
 
     /// What the sampler does, in a sentence or three.

@@ -1,17 +1,15 @@
 //! From configuration and mesh to a scene: features become types, and what is absent claims no numbers.
 
 use glam::Vec3;
-use sha2::{Digest, Sha256};
 
 use crate::accel::Accel;
 use crate::error::{Error, Result};
 use crate::sampling::{Decision, SampleLayout};
 
 use super::camera::{Aperture, Camera, PixelSample};
-use super::config::{CameraConfig, Estimator, FramebufferConfig, SceneConfig, Shading};
+use super::config::{CameraConfig, Estimator, SceneConfig, Shading};
 use super::geometry;
 use super::light::LightSet;
-use super::load::LoadedScene;
 use super::mesh::Mesh;
 
 /// The four stages of the sheet's Figure 1.
@@ -159,20 +157,6 @@ impl Scene {
 fn reach(mesh: &Mesh, eye: Vec3) -> f32 {
     let largest = mesh.positions.iter().flatten().fold(eye.abs(), |m, p| m.max(p.abs())).max_element();
     2.0 * largest
-}
-
-/// Hash of everything that decides a scene's picture but for what an experiment sets itself (size, samples, exposure,
-/// estimator): SHA-256 of the full configuration and of every file read, in hex.
-pub fn content_hash(loaded: &LoadedScene) -> String {
-    let mut config = loaded.config.clone();
-    config.framebuffer = FramebufferConfig::default();
-    config.estimator = Estimator::Unbiased;
-    let mut hash = Sha256::new();
-    hash.update(config.to_json());
-    for input in &loaded.inputs {
-        hash.update(input.sha256.as_bytes());
-    }
-    hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
 }
 
 /// A camera configuration for scenes built in memory: at `pos`, looking along `dir`, pinhole.

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use glam::{DVec3, Vec2, Vec3};
 use sha2::{Digest, Sha256};
 
-use super::config::{MaterialPatch, SceneConfig};
+use super::config::{Estimator, FramebufferConfig, MaterialPatch, SceneConfig};
 use super::json::suggestion;
 use super::mesh::{Material, Mesh, Texture};
 use super::obj::{self, CheckedObj, MtlMaterial};
@@ -60,10 +60,16 @@ pub struct LoadedScene {
 }
 
 impl LoadedScene {
-    /// SHA-256 over everything that the scene is made of: the full state (so that `--set` and defaults count, and the
-    /// scene file's layout does not) and the other files' names and bytes.
+    /// SHA-256, in hex, of everything that decides the picture but for what an experiment sets itself (size, samples,
+    /// exposure, estimator): the full state, defaults and `--set` applied, and the other files' names and bytes. The
+    /// scene file's own layout does not count.
     pub fn content_sha256(&self) -> String {
-        let mut text = self.config.to_json();
+        let state = SceneConfig {
+            framebuffer: FramebufferConfig::default(),
+            estimator: Estimator::Unbiased,
+            ..self.config.clone()
+        };
+        let mut text = state.to_json();
         for input in self.inputs.iter().skip(1) {
             text.push_str(&format!("{} {}\n", input.sha256, input.name));
         }

@@ -1,0 +1,178 @@
+//! `run` and `report`: experiments.
+
+use std::cell::Cell;
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use sampler_lab::error::Result;
+use sampler_lab::experiment::execute::{Options, execute};
+use sampler_lab::experiment::lab::Lab;
+use sampler_lab::experiment::plan::plan;
+use sampler_lab::experiment::progress::{Progress, Tick};
+use sampler_lab::experiment::results::kind_name;
+use sampler_lab::experiment::spec::Experiment;
+use sampler_lab::experiment::survey::{Standing, Survey};
+use sampler_lab::report;
+use serde_json::json;
+
+use super::{SceneArgs, WorkArgs, print, print_json};
+
+/// Arguments of `run`.
+#[derive(Args)]
+pub struct Run {
+    /// Experiment file
+    experiment: PathBuf,
+    /// Folder for results and report [default: reports/NAME]
+    #[arg(long, short, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Say what would be done and what it costs; do nothing
+    #[arg(long)]
+    dry_run: bool,
+    /// Forget what the folder holds and do everything again
+    #[arg(long)]
+    fresh: bool,
+    /// One JSON document on stdout
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    files: SceneArgs,
+    #[command(flatten)]
+    work: WorkArgs,
+}
+
+impl Run {
+    /// Renders what is missing, then writes the report.
+    pub fn run(self) -> Result<()> {
+        let experiment = Experiment::read(&self.experiment)?;
+        let out = self.out.clone().unwrap_or_else(|| PathBuf::from("reports").join(&experiment.name));
+        let lab = Lab::new(&self.experiment, self.files.options());
+        let plan = plan(&experiment, &lab)?;
+        self.work.warn(&lab.warnings());
+        self.work.warn(&plan.notes);
+        let survey = Survey::new(&plan, &Standing::read(&plan, &out)?, &out, self.work.threads());
+        if self.dry_run {
+            return if self.json { print_json(&survey_json(&survey)) } else { print(&format!("{survey}\n")) };
+        }
+        if !self.work.quiet {
+            eprintln!("{} -> {}\n{survey}", self.experiment.display(), out.display());
+        }
+        let mut options = Options::new(self.work.threads(), self.command());
+        options.fresh = self.fresh;
+        let bar = Bar::new(self.work.quiet);
+        let outcome = execute(&plan, &lab, &out, &bar, &options)?;
+        bar.bar.finish_and_clear();
+        let written = report::write(&out)?;
+        if self.json {
+            print_json(&json!({
+                "folder": out.display().to_string(),
+                "report": written.report.display().to_string(),
+                "items": outcome.items,
+                "found": outcome.found,
+                "done": outcome.done,
+                "failed": outcome.failures.len(),
+                "samples": outcome.samples,
+            }))?;
+        } else if !self.work.quiet {
+            eprintln!(
+                "{} items: {} found, {} done, {} failed",
+                outcome.items,
+                outcome.found,
+                outcome.done,
+                outcome.failures.len()
+            );
+            eprintln!("report: {}", written.report.display());
+        }
+        outcome.check()
+    }
+
+    /// The command that makes this folder, without what does not change a byte of it.
+    fn command(&self) -> String {
+        let mut command = format!("sampler-lab run {}", self.experiment.display());
+        for set in &self.files.set {
+            command += &format!(" --set '{set}'");
+        }
+        command
+    }
+}
+
+/// The survey as JSON.
+fn survey_json(survey: &Survey) -> serde_json::Value {
+    let kinds =
+        survey.items.iter().map(|&(kind, all, left)| json!({"kind": kind_name(kind), "items": all, "left": left}));
+    json!({
+        "items": kinds.collect::<Vec<_>>(),
+        "samples": survey.samples,
+        "samples_left": survey.samples_left,
+        "samples_per_second": survey.rate,
+        "rate_is_measured": survey.is_rate_measured,
+        "seconds_left": survey.seconds_left,
+        "memory_bytes": survey.memory_bytes,
+        "disk_bytes": survey.disk_bytes,
+    })
+}
+
+/// Arguments of `report`.
+#[derive(Args)]
+pub struct Report {
+    /// Results folder, such as reports/assignment-4
+    folder: PathBuf,
+    /// Say nothing but errors on stderr
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+impl Report {
+    /// Rewrites the report.
+    pub fn run(self) -> Result<()> {
+        let written = report::write(&self.folder)?;
+        if !self.quiet {
+            eprintln!("report: {}", written.report.display());
+        }
+        written.check()
+    }
+}
+
+/// A bar over samples with rate and time left on a terminal; elsewhere a line every ten seconds.
+struct Bar {
+    bar: ProgressBar,
+    lines: Option<Cell<Instant>>,
+}
+
+impl Bar {
+    fn new(quiet: bool) -> Self {
+        let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(0) };
+        let style = ProgressStyle::with_template("{bar:24} {percent}%  {msg}").expect("the template is well formed");
+        let lines = (!quiet && !std::io::stderr().is_terminal()).then(|| Cell::new(Instant::now()));
+        Self { bar: bar.with_style(style), lines }
+    }
+
+    fn show(&self, label: &str, tick: &Tick) {
+        let eta = tick.eta_seconds.map_or(String::new(), |s| format!(", ETA {s:.0} s"));
+        let rate = tick.samples_per_second / 1e6;
+        let text = format!("{}/{} items, {rate:.2} M samples/s{eta}  {label}", tick.items_done, tick.items);
+        if let Some(last) = self.lines.as_ref().filter(|last| last.get().elapsed() >= Duration::from_secs(10)) {
+            last.set(Instant::now());
+            eprintln!("{text}");
+        }
+        self.bar.set_length(tick.samples.max(1));
+        self.bar.set_position(tick.samples_done);
+        self.bar.set_message(text);
+    }
+}
+
+impl Progress for Bar {
+    fn item_started(&self, label: &str, tick: &Tick) {
+        self.show(label, tick);
+    }
+
+    fn item_ended(&self, tick: &Tick) {
+        self.show("", tick);
+    }
+
+    fn warn(&self, message: &str) {
+        self.bar.suspend(|| eprintln!("note: {message}"));
+    }
+}

@@ -1,0 +1,194 @@
+//! `render`: one image.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use sampler_lab::error::{Error, Result};
+use sampler_lab::experiment::backend::Size;
+use sampler_lab::film::{write_exr, write_png};
+use sampler_lab::render::render_observed;
+use sampler_lab::sampling::{MAX_SAMPLES, PointSource, Preset, Sampler, SamplerSpec};
+use sampler_lab::scene::compile::{Scene, Stage};
+use sampler_lab::scene::config::Estimator;
+use serde_json::json;
+
+use super::{SceneArgs, WorkArgs, print_json};
+
+/// Arguments of `render`.
+#[derive(Args)]
+pub struct Render {
+    /// Scene file
+    scene: PathBuf,
+    /// Where the image goes: linear .exr or tone-mapped .png [default: the scene's name with .png]
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Sampler for every decision; a bare name means its :best
+    #[arg(long, default_value = "sobol")]
+    sampler: String,
+    /// Samples per pixel [default: the scene's sppx]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
+    spp: Option<u32>,
+    /// Image size [default: the scene's]
+    #[arg(long, value_name = "WxH")]
+    size: Option<String>,
+    /// unbiased, or the sheet's shortcut: sheet [default: the scene's]
+    #[arg(long, value_name = "NAME")]
+    estimator: Option<String>,
+    /// Stage of the sheet's Figure 1: start, aa, dof, final
+    #[arg(long, default_value = "final")]
+    stage: String,
+    /// Seed of the randomisation
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// One JSON document on stdout
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    files: SceneArgs,
+    #[command(flatten)]
+    work: WorkArgs,
+}
+
+impl Render {
+    /// Renders and writes the image.
+    pub fn run(self) -> Result<()> {
+        let spec = SamplerSpec::parse(&self.sampler, Preset::Best)?;
+        let stage = Stage::ALL.into_iter().find(|s| s.name() == self.stage).ok_or_else(|| {
+            Error::input("--stage", format!("expected start, aa, dof or final, found \"{}\"", self.stage))
+        })?;
+        let estimator = self
+            .estimator
+            .as_deref()
+            .map(|e| {
+                Estimator::from_name(e)
+                    .ok_or_else(|| Error::input("--estimator", format!("expected unbiased or sheet, found \"{e}\"")))
+            })
+            .transpose()?;
+        let size = self.size.as_deref().map(|s| Size::parse(s).map_err(|e| Error::input("--size", e))).transpose()?;
+        let out = self
+            .out
+            .clone()
+            .unwrap_or_else(|| PathBuf::from(self.scene.file_stem().unwrap_or_default()).with_extension("png"));
+        let format = Format::of(&out)?;
+        self.work.start_threads()?;
+
+        let started = Instant::now();
+        let mut loaded = self.files.open(&self.scene)?;
+        let load_seconds = started.elapsed().as_secs_f64();
+        let framebuffer = loaded.config.framebuffer;
+        loaded.config.estimator = estimator.unwrap_or(loaded.config.estimator);
+        let size = size.unwrap_or(Size { width: framebuffer.res_w, height: framebuffer.res_h });
+        let started = Instant::now();
+        let scene = Scene::new(&loaded.config, loaded.mesh, (size.width, size.height), stage)?;
+        let build_seconds = started.elapsed().as_secs_f64();
+        self.work.warn(&loaded.warnings);
+        self.work.warn(&scene.warnings);
+
+        let asked = self.spp.unwrap_or(framebuffer.sppx);
+        let sampler = Sampler::new(spec, &scene.layout, asked, self.seed)?;
+        let samples = size.pixels() * u64::from(sampler.samples());
+        if !self.work.quiet {
+            let bytes = scene.bytes() as u64 + 24 * size.pixels();
+            eprintln!(
+                "{} at {size}, {} samples a pixel of {} = {}; about {} MB",
+                self.scene.display(),
+                sampler.samples(),
+                self.sampler,
+                spec.expansion(),
+                bytes / 1_000_000 + 1
+            );
+            eprintln!("{}: {}", stage.name(), scene.layout);
+        }
+        let bar = bar(samples, self.work.quiet);
+        let started = Instant::now();
+        let rendered = render_observed(&scene, &sampler, &|done| bar.inc(done))
+            .map_err(|bad| Error::incomplete(self.scene.display(), bad))?;
+        let render_seconds = started.elapsed().as_secs_f64();
+        bar.finish_and_clear();
+
+        let estimator = scene.estimator.name();
+        match format {
+            Format::Png => write_png(&out, &rendered.image, framebuffer.exposure)?,
+            Format::Exr => {
+                let text = |name: &str, value: &dyn std::fmt::Display| (name.to_owned(), value.to_string());
+                let provenance = [
+                    text("version", &env!("CARGO_PKG_VERSION")),
+                    text("scene", &self.scene.display()),
+                    text("sampler", &spec),
+                    text("spp", &sampler.samples()),
+                    text("seed", &self.seed),
+                    text("estimator", &estimator),
+                    text("stage", &stage.name()),
+                ];
+                write_exr(&out, &rendered.image, &provenance)?;
+            }
+        }
+        let per_second = |count: u64| count as f64 / render_seconds.max(1e-9);
+        if !self.work.quiet {
+            eprintln!(
+                "{}: load {load_seconds:.3} s, build {build_seconds:.3} s, render {render_seconds:.3} s, {:.2} M samples/s, {:.2} M rays/s",
+                out.display(),
+                per_second(samples) / 1e6,
+                per_second(rendered.rays) / 1e6
+            );
+        }
+        if self.json {
+            print_json(&json!({
+                "file": out.display().to_string(),
+                "scene": self.scene.display().to_string(),
+                "sampler": spec.to_string(),
+                "expansion": spec.expansion(),
+                "layout": scene.layout.to_string(),
+                "estimator": estimator,
+                "stage": stage.name(),
+                "spp": {"asked": asked, "taken": sampler.samples()},
+                "size": size.to_string(),
+                "seed": self.seed,
+                "focal_depth": scene.focal_depth(),
+                "render_seconds": render_seconds,
+                "load_seconds": load_seconds,
+                "build_seconds": build_seconds,
+                "samples_per_second": per_second(samples),
+                "rays_per_second": per_second(rendered.rays),
+                "peak_bytes": peak_bytes(),
+            }))?;
+        }
+        Ok(())
+    }
+}
+
+/// What the output is, by its name's end.
+#[derive(Clone, Copy)]
+enum Format {
+    Png,
+    Exr,
+}
+
+impl Format {
+    fn of(path: &Path) -> Result<Self> {
+        match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
+            Some("png") => Ok(Self::Png),
+            Some("exr") => Ok(Self::Exr),
+            _ => Err(Error::input(
+                "--out",
+                format!("expected a name that ends in .png or .exr, found \"{}\"", path.display()),
+            )),
+        }
+    }
+}
+
+/// A bar in samples with rate and time left; shown on terminals only.
+fn bar(samples: u64, quiet: bool) -> ProgressBar {
+    let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(samples) };
+    let style = ProgressStyle::with_template("{bar:30} {percent}%  {human_pos} samples  {per_sec}  ETA {eta}");
+    bar.with_style(style.expect("the template is well formed"))
+}
+
+/// Largest resident size of this process so far, where the system tells it.
+fn peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
+}

@@ -1,0 +1,220 @@
+//! Arguments, and what goes where: results to stdout or files, all else to stderr.
+
+mod experiment;
+mod image;
+mod sets;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Parser, Subcommand};
+use sampler_lab::error::{Error, Result};
+use sampler_lab::sampling::{Decision, Points, Preset, SampleLayout, SamplerSpec};
+use sampler_lab::scene::compile::{Scene, Stage};
+use sampler_lab::scene::config::SceneConfig;
+use sampler_lab::scene::load::{self, LoadedScene, OpenOptions};
+
+/// What the choice of sample points does to a rendered image, with numbers.
+#[derive(Parser)]
+#[command(
+    version,
+    max_term_width = 100,
+    after_help = "Exit codes: 0 done, 1 a test or gate failed, 2 usage or bad input, 3 writing failed, 4 incomplete, 130 interrupted."
+)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Run an experiment: render what is missing, then write the report
+    Run(experiment::Run),
+    /// Rewrite the report of a results folder from its stored rows; renders nothing
+    Report(experiment::Report),
+    /// Render one image
+    Render(image::Render),
+    /// Draw and write point sets: the sheet's Figure 2
+    Points(sets::DrawPoints),
+    /// Measure a point set: discrepancies, t-value, distances
+    Measure(sets::Measure),
+    /// Show or check a scene file
+    Config(Config),
+    /// Say what a sampler does, and which numbers its decisions read for a scene
+    Explain(Explain),
+}
+
+impl Cli {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        match self.command {
+            Command::Run(args) => args.run(),
+            Command::Report(args) => args.run(),
+            Command::Render(args) => args.run(),
+            Command::Points(args) => args.run(),
+            Command::Measure(args) => args.run(),
+            Command::Config(args) => args.run(),
+            Command::Explain(args) => args.run(),
+        }
+    }
+}
+
+/// Where scene files look for meshes, and what is changed in them.
+#[derive(Args)]
+struct SceneArgs {
+    /// Another folder to look for mesh files in (may be given several times)
+    #[arg(long, value_name = "DIR")]
+    data: Vec<PathBuf>,
+    /// Change a key of the scene file, such as camera.fov=40 (may be given several times)
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+}
+
+impl SceneArgs {
+    fn options(&self) -> OpenOptions {
+        OpenOptions { data: self.data.clone(), sets: self.set.clone() }
+    }
+
+    fn open(&self, scene: &Path) -> Result<LoadedScene> {
+        load::open(scene, &self.options())
+    }
+}
+
+/// How many threads, and how much is said.
+#[derive(Args)]
+struct WorkArgs {
+    /// Threads to work with; the results do not depend on it [default: all processors]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Say nothing but errors on stderr
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+impl WorkArgs {
+    /// The number of threads asked for, or that of the processors.
+    fn threads(&self) -> usize {
+        self.threads.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from)
+    }
+
+    /// Sets rayon's own pool up.
+    fn start_threads(&self) -> Result<()> {
+        let threads = self.threads();
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()
+            .map_err(|e| Error::input("--threads", format!("expected {threads} threads to start, found: {e}")))
+    }
+
+    /// Prints warnings to stderr.
+    fn warn(&self, warnings: &[String]) {
+        if !self.quiet {
+            for warning in warnings {
+                eprintln!("note: {warning}");
+            }
+        }
+    }
+}
+
+/// Writes a result to stdout; a reader that has gone away ends the program quietly.
+fn print(text: &str) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => std::process::exit(0),
+        other => other.map_err(|e| Error::write(Path::new("standard output"), e)),
+    }
+}
+
+/// Writes one JSON document to stdout.
+fn print_json(value: &impl serde::Serialize) -> Result<()> {
+    let text = serde_json::to_string_pretty(value).expect("our results are plain data");
+    print(&(text + "\n"))
+}
+
+#[derive(Args)]
+struct Config {
+    #[command(subcommand)]
+    action: ConfigAction,
+}
+
+#[derive(Subcommand)]
+enum ConfigAction {
+    /// Print the full state with every default made explicit
+    Show(ConfigFile),
+    /// Read the scene with all its files, and say what is noteworthy
+    Check(ConfigFile),
+}
+
+#[derive(Args)]
+struct ConfigFile {
+    /// Scene file
+    file: PathBuf,
+    #[command(flatten)]
+    scene: SceneArgs,
+}
+
+impl Config {
+    fn run(self) -> Result<()> {
+        match self.action {
+            ConfigAction::Show(args) => {
+                let config = SceneConfig::read(&args.file, &args.scene.set)?;
+                for warning in config.warnings() {
+                    eprintln!("note: {warning}");
+                }
+                print(&config.to_json())
+            }
+            ConfigAction::Check(args) => {
+                let loaded = args.scene.open(&args.file)?;
+                for warning in &loaded.warnings {
+                    eprintln!("note: {warning}");
+                }
+                let framebuffer = loaded.config.framebuffer;
+                let triangles = loaded.mesh.len();
+                let scene =
+                    Scene::new(&loaded.config, loaded.mesh, (framebuffer.res_w, framebuffer.res_h), Stage::Final)?;
+                print(&format!("{}: sound; {triangles} triangles; {}\n", args.file.display(), scene.layout))
+            }
+        }
+    }
+}
+
+#[derive(Args)]
+struct Explain {
+    /// Sampler, as POINTS[:ORDER[:RANDOM[@SCOPE]]] or POINTS:PRESET
+    sampler: String,
+    /// Scene whose decisions are shown
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+    #[command(flatten)]
+    files: SceneArgs,
+}
+
+impl Explain {
+    fn run(self) -> Result<()> {
+        let spec = SamplerSpec::parse(&self.sampler, Preset::Best)?;
+        let mut text = format!("{} = {}\n{}\n", self.sampler, spec.expansion(), spec.describe());
+        if spec.points == Points::Stratified {
+            text += "A count without a factor pair a×b, b/a ≤ 2, is raised to the next that has one: 26 → 28 = 4×7.\n";
+        }
+        if let Some(path) = &self.scene {
+            let loaded = self.files.open(path)?;
+            let framebuffer = loaded.config.framebuffer;
+            let scene = Scene::new(&loaded.config, loaded.mesh, (framebuffer.res_w, framebuffer.res_h), Stage::Final)?;
+            text += &format!("\n{}: {}\n", path.display(), scene.layout);
+            text += &layout_table(&spec, &scene.layout);
+        }
+        print(&text)
+    }
+}
+
+/// Decision by decision, what is read.
+fn layout_table(spec: &SamplerSpec, layout: &SampleLayout) -> String {
+    let mut text = String::new();
+    for claim in layout.claims() {
+        text += &format!("  {:<12} {}\n", claim.decision.name(), spec.reads(*claim));
+    }
+    for absent in Decision::ALL.iter().filter(|d| layout.find(**d).is_none()) {
+        text += &format!("  {:<12} not decided in this scene: no numbers\n", absent.name());
+    }
+    text
+}
