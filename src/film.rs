@@ -196,10 +196,16 @@ pub fn to_screen(image: &Image, exposure: f32) -> Vec<u8> {
 pub fn write_png_rgb8(path: &Path, width: u32, height: u32, bytes: &[u8]) -> Result<()> {
     use image::ImageEncoder;
     use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-    let mut png = Vec::new();
-    PngEncoder::new_with_quality(&mut png, CompressionType::Best, FilterType::Adaptive)
-        .write_image(bytes, width, height, image::ExtendedColorType::Rgb8)
-        .map_err(|e| Error::write(path, format!("cannot encode PNG: {e}")))?;
+    // Pictures compress better with row filters, charts without: the smaller is kept.
+    let encoded = |filter| {
+        let mut png = Vec::new();
+        PngEncoder::new_with_quality(&mut png, CompressionType::Best, filter)
+            .write_image(bytes, width, height, image::ExtendedColorType::Rgb8)
+            .map_err(|e| Error::write(path, format!("cannot encode PNG: {e}")))?;
+        Ok(png)
+    };
+    let (filtered, plain) = (encoded(FilterType::Adaptive)?, encoded(FilterType::NoFilter)?);
+    let png = if plain.len() < filtered.len() { plain } else { filtered };
     write_whole(path, &png)
 }
 
