@@ -322,8 +322,8 @@ fn the_penumbra_scene_is_its_closed_form() {
         let sums: Vec<f64> = images.iter().map(|i| sum(i)).collect();
         let verdict = Exact { value: sum(&exact), allowance: sum(&allowance) }.test(&sums, family);
         assert!(verdict.holds(), "tiles {region:?}: {verdict}");
-        // A bias of 1 % of full light in any tile is caught.
-        assert!(verdict.detects.unwrap() < 0.01 * brightest, "tiles {region:?}: {verdict}");
+        // A bias of 1.5 % of full light in any tile is caught.
+        assert!(verdict.detects.unwrap() < 0.015 * brightest, "tiles {region:?}: {verdict}");
     }
 }
 
