@@ -48,7 +48,7 @@ impl Page {
         self.paragraph(&lines.join("\n"));
     }
 
-    /// A table; columns after the first are set to the right. Without rows it leaves nothing.
+    /// A table; columns of numbers are set to the right. Without rows it leaves nothing.
     pub fn table(&mut self, head: &[&str], rows: &[Vec<String>]) {
         if rows.is_empty() {
             return;
@@ -56,7 +56,9 @@ impl Page {
         let line = |cells: &[String]| format!("| {} |", cells.join(" | "));
         let cell = |text: &str| text.replace('|', "\\|").replace('\n', " ");
         let mut lines = vec![line(&head.iter().map(|text| cell(text)).collect::<Vec<_>>())];
-        let rule = (0..head.len()).map(|i| if i == 0 { "---" } else { "---:" }.to_owned());
+        let is_number = |text: &String| text.starts_with(|c: char| c.is_ascii_digit() || "−+–<".contains(c));
+        let numbers = |i: usize| 2 * rows.iter().filter_map(|row| row.get(i)).filter(|text| is_number(text)).count();
+        let rule = (0..head.len()).map(|i| if numbers(i) > rows.len() { "---:" } else { "---" }.to_owned());
         lines.push(line(&rule.collect::<Vec<_>>()));
         lines.extend(rows.iter().map(|row| line(&row.iter().map(|text| cell(text)).collect::<Vec<_>>())));
         self.block(&lines.join("\n"));

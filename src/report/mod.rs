@@ -24,5 +24,6 @@ mod pictured;
 mod sections;
 mod write;
 
+pub use sections::report as text;
 pub use summarise::{Summary, summarise};
 pub use write::{FigureState, Figures, Written, write};

@@ -56,7 +56,7 @@ pub fn stages(dir: &Path, summary: &Summary) -> Result<Rgb8> {
             captions: vec![format!("{}, {} spp", words[row.stage as usize], row.spp.taken)],
         })
         .collect();
-    strip(&cells, &StripLayout { columns: 2, whole: Some(2), crops: Vec::new(), scale_bar: None })
+    strip(&cells, &StripLayout { columns: 2, whole: Some(1), crops: Vec::new(), scale_bar: None })
 }
 
 /// A part of the picture worth a closer look, and why.
@@ -68,36 +68,39 @@ pub struct Detail {
     pub crop: Crop,
 }
 
-/// The three windows to enlarge: where sampling the pixel changes most, where the lens does, and where the light falls
-/// most unevenly on an even surface. Without the stages' images, or where windows do not fit: none.
-fn details(dir: &Path, summary: &Summary) -> Vec<Detail> {
+/// The three windows to enlarge, each scored where the light falls: where sampling the pixel changes most and the lens
+/// does not, where the lens does, and where the relative errors of all pictures are largest though neither does. Without the stages' images, or
+/// where windows do not fit: none.
+fn details(dir: &Path, summary: &Summary, reference: &Image, pictures: &[Image]) -> Vec<Detail> {
     let images: Option<Vec<Image>> = summary.stages.iter().map(|row| image(dir, &row.id).ok()).collect();
     let Some(images) = images.filter(|images| images.len() == 4) else { return Vec::new() };
-    let [start, aa, dof, last] = [0, 1, 2, 3].map(|i| &images[i]);
-    let (width, height) = (last.width, last.height);
-    if width < 3 * CROP || height < CROP || images.iter().any(|i| (i.width, i.height) != (width, height)) {
+    let (width, height) = (reference.width, reference.height);
+    let fits = |i: &Image| (i.width, i.height) == (width, height);
+    if width < 3 * CROP || height < CROP || !images.iter().chain(pictures).all(fits) {
         return Vec::new();
     }
     let grey = |image: &Image, i: usize| image.pixels[i].iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0;
-    let change = |a: &Image, b: &Image| (0..a.pixels.len()).map(|i| libm::pow(grey(a, i) - grey(b, i), 2.0)).collect();
-    let (edges, blur): (Vec<f64>, Vec<f64>) = (change(start, aa), change(aa, dof));
-    // Light falling on the surface; steps between neighbours count where the surface itself has none.
-    let lit: Vec<f64> = (0..last.pixels.len()).map(|i| grey(last, i) / grey(dof, i).max(0.02)).collect();
-    let step = |v: &dyn Fn(usize) -> f64, i: usize| {
-        let (x, y) = (i as u32 % width, i as u32 / width);
-        let across = if x + 1 < width { (v(i + 1) - v(i)).abs() } else { 0.0 };
-        let down = if y + 1 < height { (v(i + width as usize) - v(i)).abs() } else { 0.0 };
-        across + down
-    };
-    let shadow: Vec<f64> =
-        (0..lit.len()).map(|i| step(&|i| lit[i].min(1.0), i) / (1.0 + 50.0 * step(&|i| grey(dof, i), i))).collect();
+    let square = |a: &Image, b: &Image, i: usize| (grey(a, i) - grey(b, i)) * (grey(a, i) - grey(b, i));
+    let [edge, blur] = [0, 1].map(|k| move |images: &[Image], i: usize| square(&images[k], &images[k + 1], i));
+    // A change of albedo below 0.02 is none.
+    let even = |change: f64| 1.0 / (1.0 + change / 4e-4);
+    let light = |i: usize| (grey(&images[3], i) / grey(&images[2], i).max(0.02)).min(1.0);
+    let bright = |i: usize| grey(reference, i) * grey(reference, i) + 0.01;
+    let error = |i: usize| pictures.iter().map(|p| square(p, reference, i)).sum::<f64>() / bright(i);
+    let score = |f: &dyn Fn(usize) -> f64| (0..reference.pixels.len()).map(f).collect::<Vec<f64>>();
     let wanted = [
-        ("edges: the pixel's samples change most here", edges, [230, 159, 0]),
-        ("defocus: the lens changes most here", blur, [86, 180, 233]),
-        ("penumbra: the light is most uneven here, on an even surface", shadow, [0, 158, 115]),
+        (
+            "edges (the pixel matters most, the lens does not)",
+            score(&|i| edge(&images, i) * light(i) * even(blur(&images, i))),
+        ),
+        ("defocus (the lens matters most)", score(&|i| blur(&images, i) * light(i))),
+        (
+            "shadow (relative errors are largest though neither matters)",
+            score(&|i| error(i) * even(edge(&images, i)) * even(blur(&images, i))),
+        ),
     ];
     let mut found: Vec<Detail> = Vec::new();
-    for (name, score, colour) in wanted {
+    for ((name, score), colour) in wanted.into_iter().zip([[230, 159, 0], [86, 180, 233], [0, 158, 115]]) {
         if let Some((x, y)) = best_window(&score, (width, height), &found) {
             found.push(Detail { name, crop: Crop { x, y, width: CROP, height: CROP, zoom: ZOOM, colour } });
         }
@@ -141,9 +144,9 @@ pub struct Strips {
 pub fn strips(dir: &Path, summary: &Summary) -> Result<Strips> {
     let reference = reference(dir, summary)?;
     let images: Vec<Image> = summary.pictures.iter().map(|row| image(dir, &row.id)).collect::<Result<_>>()?;
-    let details = details(dir, summary);
+    let details = details(dir, summary, &reference, &images);
     let crops: Vec<Crop> = details.iter().map(|detail| detail.crop).collect();
-    let title = format!("reference, {}", summary.picture_reference.as_ref().map_or("", |row| row.sampler.as_str()));
+    let title = "reference".to_owned();
     let whole_shown = shown(&reference);
     let whole = vec![StripCell { image: &whole_shown, title: title.clone(), captions: Vec::new() }];
     let layout = StripLayout { columns: 1, whole: Some(3), crops: crops.clone(), scale_bar: None };
@@ -166,16 +169,15 @@ fn captions(summary: &Summary, i: usize) -> Vec<String> {
             true => short(errors.mse_unbiased.sqrt()),
             false => "below the reference's noise".to_owned(),
         };
-        let neighbours = errors.error_autocorrelation.map(|rho| format!(", neighbours {}", signed(rho)));
-        lines.push(format!("RMSE {rmse}{}", neighbours.unwrap_or_default()));
+        lines.push(format!("{} spp, RMSE {rmse}", row.spp.taken));
+        lines.extend(errors.error_autocorrelation.map(|rho| format!("ρ of neighbours {}", signed(rho))));
     }
     lines
 }
 
 fn sampler_title(summary: &Summary, i: usize) -> String {
     let row = &summary.pictures[i];
-    let label = summary.samplers.iter().find(|s| s.canonical == row.sampler).map_or(row.sampler.as_str(), |s| &s.label);
-    format!("{label}, {} spp", row.spp.taken)
+    summary.samplers.iter().find(|s| s.canonical == row.sampler).map_or(&row.sampler, |s| &s.label).clone()
 }
 
 fn detail_strip(summary: &Summary, title: &str, reference: &Image, images: &[Image], crops: &[Crop]) -> Result<Rgb8> {
@@ -193,7 +195,9 @@ fn detail_strip(summary: &Summary, title: &str, reference: &Image, images: &[Ima
 
 fn error_strip(summary: &Summary, reference: &Image, images: &[Image]) -> Result<Rgb8> {
     let scale = error_scale(images, reference)?;
-    let maps: Vec<Rgb8> = images.iter().map(|image| error_map(image, reference, scale)).collect::<Result<_>>()?;
+    let black = Image::black(reference.width, reference.height);
+    let map = |image: &Image| error_map(&in_steps(image, reference, scale), &black, scale);
+    let maps: Vec<Rgb8> = images.iter().map(map).collect::<Result<_>>()?;
     let cells: Vec<StripCell> = maps
         .iter()
         .enumerate()
@@ -201,4 +205,19 @@ fn error_strip(summary: &Summary, reference: &Image, images: &[Image]) -> Result
         .collect();
     let scale_bar = Some(ScaleBar { scale, label: "luminance − reference (radiance)".to_owned() });
     strip(&cells, &StripLayout { columns: 5, whole: Some(1), crops: Vec::new(), scale_bar })
+}
+
+/// The errors in luminance as a grey image, in steps of a fifth of `scale`: enough to tell structure from noise, and the file is
+/// a third as large.
+fn in_steps(test: &Image, reference: &Image, scale: f64) -> Image {
+    let luminance = |p: &[f32; 3]| 0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2]);
+    let step = |(t, r): (&[f32; 3], &[f32; 3])| {
+        let steps = (5.0 * (luminance(t) - luminance(r)) / scale).round().clamp(-5.0, 5.0);
+        [(steps / 5.0 * scale) as f32; 3]
+    };
+    Image {
+        width: test.width,
+        height: test.height,
+        pixels: std::iter::zip(&test.pixels, &reference.pixels).map(step).collect(),
+    }
 }

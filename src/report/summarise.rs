@@ -8,10 +8,10 @@ use std::collections::HashMap;
 use crate::experiment::backend::{SceneFacts, Size};
 use crate::experiment::results::{About, Count, EnsembleRow, ImageRow, Kind, PointsRow, ReferenceRow, Row, Timing};
 use crate::experiment::spec::Experiment;
-use crate::sampling::{Decision, Points, Preset, SamplerSpec, Scope};
+use crate::sampling::{Decision, Order, Points, Preset, Random, SamplerSpec, Scope};
 use crate::stats::{Estimate, SlopeFit, slope_with_interval, t_interval};
 
-use super::evidence::{Course, ratio_of_roots};
+use super::evidence::{Course, ratio, ratio_of_roots};
 
 /// Counts that a slope of RMSE is fitted over: powers of two from 4 to 256 that the sampler takes as asked (METHODS §5).
 pub const SLOPE_COUNTS: std::ops::RangeInclusive<u32> = 4..=256;
@@ -78,9 +78,14 @@ pub struct SamplerSummary {
 }
 
 impl SamplerSummary {
-    /// Whether each pixel sees the same points, so that neighbours may err alike.
+    /// Whether each pixel sees the same points, or one axis of them, so that neighbours may err alike.
     pub fn repeats_in_every_pixel(&self) -> bool {
-        let repeats = |spec: &SamplerSpec| !spec.is_random() || matches!(spec.scope, Scope::Image | Scope::Decision);
+        let repeats = |spec: &SamplerSpec| {
+            let is_shared = matches!(spec.scope, Scope::Image | Scope::Decision);
+            // Hammersley's x = i/n is untouched by a shift of y; a shuffle of the indices mixes it anew.
+            let has_fixed_axis = spec.random == Random::Yxor && spec.order == Order::Step;
+            !spec.is_random() || is_shared || has_fixed_axis
+        };
         self.spec.as_ref().is_some_and(repeats)
     }
 }
@@ -244,7 +249,8 @@ impl Summary {
         Some(Course {
             rmse_ratio: ratio_of_roots(&to.mse, &from.mse)?,
             independent: (f64::from(from.spp.taken) / f64::from(to.spp.taken)).sqrt(),
-            bias2: [from.bias2, to.bias2],
+            bias2: to.bias2,
+            bias2_ratio: ratio(&to.bias2, &from.bias2),
         })
     }
 }
@@ -486,7 +492,7 @@ impl<'a> Index<'a> {
 /// Whether another seed gives the same image: the sheet's 1-D samplers are jittered also where its 2-D ones are not.
 fn is_fixed(sampler: &SamplerSummary, scene: &SceneFacts) -> bool {
     let has_1d = scene.layout.contains(Decision::LightPick.name());
-    sampler.spec.is_some_and(|spec| !spec.is_random() && !(spec.sheet_1d && has_1d))
+    sampler.spec.is_some_and(|spec| !(spec.is_random() || spec.sheet_1d && has_1d))
 }
 
 fn point_set(sampler: usize, metric: &str, sets: &[&PointsRow], is_fixed: bool) -> PointSet {

@@ -10,7 +10,7 @@ use super::correlation::patterns;
 use super::identical::bytes;
 use super::points::star_against_uniform;
 use super::titles;
-use super::words::{against_one, bias_words, main_scene, name, rmse_ratio, rows, scene_name, times};
+use super::words::{against_one, bias_short, main_scene, name, rmse_ratio, rows, scene_name, times};
 
 /// Lines of the box.
 const MOST_LINES: usize = 8;
@@ -56,7 +56,6 @@ fn uniform_line(summary: &Summary, uniform: usize) -> Option<String> {
     let unbiased = unbiased.filter(|course| course.is_biased() == Answer::No).count();
     let scene = main_scene(summary)?;
     let cell = cells.iter().find(|cell| cell.scene == scene)?;
-    let mean = summary.scenes[scene].reference.as_ref().map(|r| r.mean);
     let slope = summary.slope(scene, uniform).and_then(|slope| slope.fit.as_ref());
     let slope = slope.map(|fit| {
         let slope = crate::stats::Estimate { value: fit.slope, ci95: fit.ci95 };
@@ -67,7 +66,7 @@ fn uniform_line(summary: &Summary, uniform: usize) -> Option<String> {
         "advantage: right on average in {unbiased} of {} (in {}: {}); disadvantage: slow{}, at {least} spp {beaten}. See {}. {}",
         super::words::scenes(cells.len()),
         scene_name(summary, scene),
-        bias_words(cell, mean),
+        bias_short(cell),
         slope.unwrap_or_default(),
         link_to(titles::CONVERGENCE),
         rows(&[cell])
@@ -129,8 +128,7 @@ fn literal(summary: &Summary, points: Points) -> Option<String> {
             .iter()
             .filter_map(|&scene| {
                 let cell = summary.cell(scene, sheet, to)?;
-                let mean = summary.scenes[scene].reference.as_ref().map(|r| r.mean);
-                Some(format!("{} ({})", scene_name(summary, scene), bias_words(cell, mean)))
+                Some(format!("{} ({})", scene_name(summary, scene), bias_short(cell)))
             })
             .collect();
         listed(&items)
@@ -230,12 +228,12 @@ fn hurts(summary: &Summary) -> Option<String> {
             _ => "Whether it hurts between decisions cannot be told",
         };
         parts.push(format!(
-            "{words}: at {} spp RMSE of {} / {} is at most {}, in {} ({})",
+            "{words}: in the worst case, {} at {} spp, the RMSE of {} is {} times that of {} ({})",
+            scene_name(summary, scene),
             summary.most_spp()?,
             name(summary, sheet),
-            name(summary, best),
             times(&ratio),
-            scene_name(summary, scene),
+            name(summary, best),
             link_to(titles::DECISIONS)
         ));
     }

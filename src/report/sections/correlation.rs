@@ -1,6 +1,6 @@
 //! Decisions in step, and one pattern in every pixel.
 
-use crate::sampling::{Order, SamplerSpec, Scope};
+use crate::sampling::{Order, Random, SamplerSpec, Scope};
 use crate::stats::Estimate;
 
 use super::super::evidence::{Answer, Limit, above, below, ratio};
@@ -142,15 +142,22 @@ fn course_row(summary: &Summary, scene: usize, sampler: usize, from: u32, to: u3
 /// What happened to the literal reading of one family in one scene, and whether keeping decisions apart cured it.
 pub fn literal_sentence(summary: &Summary, scene: usize, sheet: usize, best: usize) -> Option<String> {
     let (from, to) = summary.course_counts()?;
-    let course = summary.course(scene, sheet)?;
     let (literal, cured) = (summary.cell(scene, sheet, to)?, summary.cell(scene, best, to)?);
     let (sheet_name, best_name, at) = (name(summary, sheet), name(summary, best), scene_name(summary, scene));
+    let Some(course) = summary.course(scene, sheet) else {
+        let cure = cure_words(literal, cured, &best_name);
+        return Some(format!(
+            "{sheet_name} in {at}: an error is not above the reference's noise, so its course cannot be told. {cure} {}",
+            rows(&[literal, cured])
+        ));
+    };
     let kept = times(&course.rmse_ratio);
     let mean = summary.scenes[scene].reference.as_ref().map(|r| r.mean);
     let bias = bias_words(literal, mean);
     let what = match course.limit() {
         Limit::Wrong => format!(
-            "**{sheet_name} converges to a wrong image in {at}**: from {from} to {to} spp its RMSE stays at {kept} of what it was, with {bias}"
+            "**{sheet_name} converges to a wrong image in {at}**: from {from} to {to} spp its RMSE stays at {kept} of what it was and its bias² at {}, with {bias}",
+            ratio_cell(course.bias2_ratio)
         ),
         Limit::Stalls => {
             let low = summary.cell(scene, sheet, from)?;
@@ -162,7 +169,7 @@ pub fn literal_sentence(summary: &Summary, scene: usize, sheet: usize, best: usi
         }
         Limit::Falls if course.is_biased() == Answer::Yes => {
             format!(
-                "{sheet_name} in {at}: the error falls to {kept} from {from} to {to} spp, yet a bias is there at both: {bias}"
+                "{sheet_name} in {at}: the error falls to {kept} from {from} to {to} spp, but there is a bias: {bias}"
             )
         }
         Limit::Falls => format!("{sheet_name} in {at}: the error falls to {kept} from {from} to {to} spp; {bias}"),
@@ -276,7 +283,7 @@ pub fn between_pixels(summary: &Summary, page: &mut Page) {
         .flat_map(|scene| patterns(summary, scene).into_iter().map(move |p| (scene, p)))
         .collect();
     page.paragraph(&format!(
-        "ρ is the correlation between the errors of neighbouring pixels at {spp} spp. A sampler that shows every pixel the same points makes neighbours err \
+        "ρ is the correlation between the errors of neighbouring pixels at {spp} spp. A sampler that shows every pixel the same points (or one axis of them) makes neighbours err \
          alike: noise becomes structure, which the eye sees more readily and which does not average out over an area (right column: spread of the whole \
          image's mean between replicates)."
     ));
@@ -286,7 +293,11 @@ pub fn between_pixels(summary: &Summary, page: &mut Page) {
         .flat_map(|scene| (0..summary.samplers.len()).map(move |sampler| (scene, sampler)))
         .filter_map(|(scene, sampler)| {
             let cell = summary.cell(scene, sampler, spp)?;
-            let pattern = if repeats.contains(&sampler) { "the same in every pixel" } else { "new in each pixel" };
+            let pattern = match (repeats.contains(&sampler), summary.samplers[sampler].spec.map(|spec| spec.random)) {
+                (true, Some(Random::Yxor)) => "x the same in every pixel",
+                (true, _) => "the same in every pixel",
+                _ => "new in each pixel",
+            };
             Some(vec![
                 scene_name(summary, scene),
                 name(summary, sampler),

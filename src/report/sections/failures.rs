@@ -2,7 +2,7 @@
 
 use crate::stats::Estimate;
 
-use super::super::evidence::{Answer, Limit, above, below, interpolated, ratio_of_roots};
+use super::super::evidence::{Answer, Limit, below, clearly_above_one, interpolated, ratio_of_roots};
 use super::super::markdown::{Page, link_to};
 use super::super::numbers::{counted, estimate, listed, percent, short, signed_estimate};
 use super::super::summarise::{Cell, Summary};
@@ -60,7 +60,7 @@ pub fn section(summary: &Summary, page: &mut Page) {
         }
     }
     if items.is_empty() {
-        page.paragraph("No failure is seen in these rows: no error stays, no bias is seen at both counts, no neighbours err alike, no odd count costs accuracy.");
+        page.paragraph("No failure is seen in these rows: no error stays, no bias is seen, no neighbours err alike, no odd count costs accuracy.");
     }
     page.bullets(&items);
     stability(summary, page);
@@ -91,7 +91,7 @@ fn course_failure(summary: &Summary, scene: usize, sampler: usize) -> Option<Str
 }
 
 fn odd_failure(summary: &Summary, scene: usize, sampler: usize) -> Option<String> {
-    let odd = odd_count(summary, scene, sampler).filter(|odd| above(&odd.ratio, 1.0) == Answer::Yes)?;
+    let odd = odd_count(summary, scene, sampler).filter(|odd| clearly_above_one(&odd.ratio))?;
     let cell = summary.cell(scene, sampler, odd.asked)?;
     Some(format!(
         "{} in {} at {} spp ({} taken): its RMSE is {} times what the powers of two around it promise. {}",
@@ -187,8 +187,8 @@ fn others(summary: &Summary, page: &mut Page) {
         .map(|sampler| {
             let odd = odd_count(summary, scene, sampler);
             let works = odd.as_ref().map_or("–".to_owned(), |odd| {
-                let word = match (above(&odd.ratio, 1.0), below(&odd.ratio, 1.0)) {
-                    (Answer::Yes, _) => "worse than promised",
+                let word = match (clearly_above_one(&odd.ratio), below(&odd.ratio, 1.0)) {
+                    (true, _) => "worse than promised",
                     (_, Answer::Yes) => "better than promised",
                     _ => "as promised, or cannot tell",
                 };
@@ -242,7 +242,7 @@ pub fn limits(summary: &Summary, page: &mut Page) {
         1 => "One replicate: no variance, and no interval that holds a sampler's own randomness.".to_owned(),
         n => format!(
             "{n} replicates: an interval's own width is good to about {} (relative standard error of a variance √(2/(R − 1)), halved for a width); \
-             with so many intervals in this report some miss their truth by chance, one in twenty by design. The verdicts on bias ask two counts for that reason.",
+             with so many intervals in this report some miss their truth by chance, one in twenty by design. The verdicts on bias and on odd counts ask for twice the distance for that reason.",
             percent((2.0 / (f64::from(n) - 1.0)).sqrt() / 2.0)
         ),
     });

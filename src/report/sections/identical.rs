@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crate::stats::Estimate;
 use crate::stats::hypothesis::{holm, welch};
 
+use super::super::evidence::Limit;
 use super::super::markdown::{Page, link_to};
 use super::super::numbers::{counted, listed, signed_estimate};
 use super::super::summarise::{Cell, Summary};
@@ -155,7 +156,20 @@ fn means(summary: &Summary, scene: usize, most: u32, page: &mut Page) {
             100.0 * EQUIVALENT
         ),
     };
-    page.paragraph(&words);
+    let hidden: Vec<String> = cells
+        .iter()
+        .filter(|cell| relative_bias(summary, cell).is_some_and(|bias| equivalent(&bias) == "yes"))
+        .filter(|cell| summary.course(scene, cell.sampler).is_some_and(|course| course.limit() == Limit::Wrong))
+        .map(|cell| name(summary, cell.sampler))
+        .collect();
+    let hidden = match hidden.as_slice() {
+        [] => String::new(),
+        list => format!(
+            "A right mean is no right image: the images of {} converge to wrong ones all the same.",
+            listed(list)
+        ),
+    };
+    page.sentences(&[words, hidden]);
 }
 
 fn agree(n: usize) -> String {

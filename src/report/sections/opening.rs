@@ -56,7 +56,9 @@ pub fn what_was_run(summary: &Summary, page: &mut Page) {
             pictures.scene, pictures.size, pictures.spp, pictures.reference_spp
         ));
     }
-    items.extend(summary.about.notes.iter().map(|note| format!("{note}.")));
+    if !summary.about.notes.is_empty() {
+        items.push(format!("The plan's notes: {}.", summary.about.notes.join("; ")));
+    }
     page.bullets(&items);
     page.paragraph("The one command that makes all of this again:");
     page.code(&summary.about.command);
@@ -87,8 +89,9 @@ pub fn how_to_read(summary: &Summary, page: &mut Page) {
         ),
         format!(
             "A verdict on where an error goes compares {}: it *falls* if the RMSE's ratio lies below the border half-way (on a \
-             logarithmic scale) between independent samples and no gain, and *stays* if it lies above; it stays *wrong* if bias² is \
-             above 0 at both counts, else it *stalls*.",
+             logarithmic scale) between independent samples and no gain, and stays if it lies above; then the image is *wrong* if there is a bias that \
+             stays, too, and it *stalls* if no bias is seen. A bias is called only where 0 is more than twice as far from the estimate as the interval's \
+             end, since among so many intervals some miss 0 by chance.",
             summary.course_counts().map_or("two counts".to_owned(), |(a, b)| format!("{a} with {b} spp"))
         ),
         "`:sheet` is the exercise sheet read literally: every decision (pixel, lens, light) walks through the same set in the same \

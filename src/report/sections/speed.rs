@@ -24,7 +24,9 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
     threads.dedup();
     page.paragraph(&format!(
         "Seconds are this machine's: {} timed on {} threads, wall seconds of rendering alone. Other work on the machine \
-         moves them; they are no part of `summary.csv`.",
+         moves them; they are no part of `summary.csv`. Seconds and rates below: median and range. Efficiency 1/(MSE · T) is in 1/(radiance² · thread-seconds), its interval from the \
+         range of T and the 95 % interval of the MSE. RMSE at equal seconds: what uniform sampling takes at its middle count, between the neighbouring counts of each \
+         sampler on a straight line of logarithms, values and interval ends alike; the spread of the seconds is not in those intervals.",
         counted(images, "image", "images"),
         listed(&threads)
     ));
@@ -127,7 +129,6 @@ fn efficiency_table(summary: &Summary, scene: usize, page: &mut Page) {
         "row".to_owned(),
     ];
     page.table(&head.iter().map(String::as_str).collect::<Vec<_>>(), &lines);
-    page.paragraph("Seconds and rates: median and range. Efficiency 1/(MSE · T) in 1/(radiance² · thread-seconds), its interval from the range of T and the 95 % interval of the MSE.");
 }
 
 fn inverse(e: &Estimate) -> Estimate {
@@ -163,8 +164,4 @@ fn equal_seconds(summary: &Summary, scene: usize, page: &mut Page) {
         .collect();
     let title = format!("{} in {} s", scene_name(summary, scene), short(budget));
     page.table(&[&title, "RMSE at equal seconds", "relative to uniform"], &lines);
-    page.paragraph(&format!(
-        "Equal seconds: what uniform sampling takes for {spp} spp; interpolated between the neighbouring counts in logarithms, values and interval ends alike; \
-         the spread of the seconds is not in these intervals."
-    ));
 }

@@ -2,8 +2,8 @@
 
 use crate::stats::Estimate;
 
-use super::super::evidence::{Answer, Course, Limit, above, below, ratio_of_roots};
-use super::super::numbers::{counted, estimate, percent, short, with_interval};
+use super::super::evidence::{Answer, Course, Limit, above, below, is_biased, ratio_of_roots};
+use super::super::numbers::{counted, estimate, percent, short};
 use super::super::summarise::{Cell, Summary};
 
 /// A sampler's name as code.
@@ -43,30 +43,36 @@ pub fn limit_words(course: &Course) -> &'static str {
     match (course.limit(), course.is_biased()) {
         (Limit::Wrong, _) => "converges to a wrong image",
         (Limit::Stalls, _) => "right on average, but stalls",
-        (Limit::Falls, Answer::Yes) => "error falls, biased",
+        (Limit::Falls, Answer::Yes) => "error falls, but biased",
         (Limit::Falls, Answer::No) => "error falls, no bias seen",
-        (Limit::Falls, Answer::CannotTell) => "error falls, bias cannot be told",
+        (Limit::Falls, Answer::CannotTell) => "error falls, perhaps biased",
         (Limit::Unclear, _) => "cannot tell",
     }
 }
 
-/// What bias² says, with what it would be seen by.
+/// What bias² says, and how large a bias could have gone unseen.
 pub fn bias_words(cell: &Cell, mean: Option<f64>) -> String {
+    let words = bias_short(cell);
+    if is_biased(&cell.bias2) != Answer::No {
+        return words;
+    }
+    let bound = cell.bias2.ci95.map_or(0.0, |[_, high]| high.max(0.0).sqrt());
+    match mean.filter(|mean| *mean > 0.0) {
+        Some(mean) => format!("{words} (a root mean square of at most {} of the mean radiance)", percent(bound / mean)),
+        None => format!("{words} (a root mean square of at most {})", short(bound)),
+    }
+}
+
+/// What bias² says.
+pub fn bias_short(cell: &Cell) -> String {
     let value = estimate(&cell.bias2);
-    match above(&cell.bias2, 0.0) {
+    match is_biased(&cell.bias2) {
         Answer::Yes => {
             let share = cell.bias_share().map(|share| format!(", {} of the MSE", percent(share.min(1.0))));
             format!("bias² {value}{}", share.unwrap_or_default())
         }
-        Answer::CannotTell if cell.bias2.ci95.is_none() => format!("bias² {value}: cannot be told from noise"),
-        _ => {
-            let bound = cell.bias2.ci95.map_or(0.0, |[_, high]| high.max(0.0).sqrt());
-            let bound = match mean.filter(|mean| *mean > 0.0) {
-                Some(mean) => format!("{} of the mean radiance", percent(bound / mean)),
-                None => short(bound),
-            };
-            format!("no bias seen: bias² {value}, so at most {bound} (root mean square)")
-        }
+        Answer::No => format!("no bias seen: bias² {value}"),
+        Answer::CannotTell => format!("perhaps a bias: bias² {value}"),
     }
 }
 
@@ -75,9 +81,9 @@ pub fn rmse_ratio(a: &Cell, b: &Cell) -> Option<Estimate> {
     ratio_of_roots(&a.mse, &b.mse)
 }
 
-/// A ratio as "x times", with words where its interval holds 1.
+/// A ratio with its interval.
 pub fn times(ratio: &Estimate) -> String {
-    with_interval(ratio, |x| if x >= 0.0995 { format!("{x:.2}") } else { short(x) })
+    estimate(ratio)
 }
 
 /// How a ratio compares with 1.
