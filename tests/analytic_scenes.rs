@@ -2,11 +2,15 @@
 //! independent of the next, in the variance, since a wrong density with a compensating factor keeps one of the two.
 //!
 //! Seeds are fixed. Every statistical test states its family's false-alarm rate, 1e-7 or less: below 1e-6 for the file.
-//! Points where rays start and end are moved by 2⁻¹⁸ of their coordinates: where that could matter, the test says so.
+//! Points where shadow rays start and end are moved by 2⁻¹⁸ of their coordinates, by design: tests against the closed form of a
+//! floor allow for the change that the closed form itself predicts from that (some 10⁻⁵ of the radiance), and no more.
 
 mod common;
 
-use common::{Room, ceiling, floor_pixels, looking_at, parallelogram, polygon_light, rendered, replicates, spec};
+use common::{
+    Exact, Room, ceiling, floor_pixels, looking_at, parallelogram, polygon_light, rendered, replicates, spec,
+    with_allowance,
+};
 use glam::{DVec3, Vec2, Vec3};
 use sampler_lab::analytic::quadrature::{Tolerance, integrate};
 use sampler_lab::analytic::{
@@ -99,6 +103,36 @@ fn one_area_sample_has_lamberts_mean_and_its_exact_variance() {
         assert!(variance.holds(), "{name}, variance: {variance}");
     }
     assert_eq!(dark, 2, "behind the light and in its plane");
+}
+
+/// Lights that are no parallelogram take their triangle from the same 2-D decision: a pentagon, a triangle, and a quadrilateral
+/// whose halves differ. Mean and variance as above; METHODS §9 no. 53: a forgotten square root would be seen. Six tests.
+#[test]
+fn mesh_lights_have_lamberts_mean_and_the_exact_variance_of_sampling_by_area() {
+    let family = Family { tests: 6, false_alarm: 1e-7 };
+    let at = Receiver { point: DVec3::ZERO, normal: DVec3::new(0.6, 0.8, 0.0) };
+    let shapes: [&[(f32, f32)]; 3] = [
+        &[(1.0, 0.0), (2.0, 0.0), (2.5, 1.0), (1.5, 2.0), (0.5, 1.0)],
+        &[(-0.5, -1.0), (1.0, -0.5), (0.0, 2.0)],
+        &[(-1.0, -1.0), (0.5, -1.0), (2.0, 1.5), (-1.0, 0.25)],
+    ];
+    for (seed, shape) in shapes.into_iter().enumerate() {
+        let c: Vec<Vec3> = shape.iter().map(|&(x, z)| Vec3::new(x, 1.25, z)).collect();
+        let triangles: Vec<[Vec3; 3]> = c[1..].windows(2).map(|pair| [c[0], pair[0], pair[1]]).collect();
+        let light = Light::new("mesh".into(), Vec3::ONE, &triangles).unwrap();
+        assert!(!light.is_parallelogram());
+        let exact = polygon_light(&c, 1.0);
+        let irradiance = exact.irradiance(&at);
+        let samples = received(&light, &at, 200_000, seed as u64);
+        let squares: Vec<f64> = samples.iter().map(|s| (s - irradiance).powi(2)).collect();
+        let verdicts = [
+            t_test(&samples, irradiance, family),
+            t_test(&squares, variance_of_one_area_sample(&exact, &at, None), family),
+        ];
+        for verdict in verdicts {
+            assert!(verdict.holds(), "shape {seed}: {verdict}");
+        }
+    }
 }
 
 /// METHODS §9 no. 46: nothing leaks through an absolute value.
@@ -254,13 +288,13 @@ fn a_half_hidden_light_gives_the_irradiance_of_its_visible_half() {
     let dark = room.material(0.5, None);
     room.polygon(&hiding, dark);
     let camera = looking_at(Vec3::new(0.6, 0.3, 0.0), Vec3::ZERO, 0.5);
-    let exact = floor_pixels(&camera, (1, 1), 0.8, polygon_light(&light, 2.0), Some(&hiding))[0];
+    let exact = floor_pixels(&camera, (1, 1), (4.0, 0.8), polygon_light(&light, 2.0), Some(&hiding))[0];
     // By symmetry half of the whole light's 0.7522…; the pixel is 0.01 wide, its first derivatives cancel.
-    assert!((exact / (0.8 * 2.0 * 0.5 * 0.752_274_688_454_107_5) - 1.0).abs() < 2e-3, "{exact}");
+    assert!((exact.value / (0.8 * 2.0 * 0.5 * 0.752_274_688_454_107_5) - 1.0).abs() < 2e-3, "{exact:?}");
     let scene = room.scene(&camera, (1, 1), Stage::Final);
     let means: Vec<f64> = replicates(&scene, spec("sobol"), 1024, 0..256).concat();
-    let verdict = t_test(&means, exact, Family { tests: 1, false_alarm: 1e-7 });
-    assert!(verdict.holds() && verdict.detects.unwrap() < 0.01 * exact, "{verdict}");
+    let verdict = exact.test(&means, Family { tests: 1, false_alarm: 1e-7 });
+    assert!(verdict.holds() && verdict.detects.unwrap() < 0.01 * exact.value, "{verdict}");
 }
 
 /// The scene's files against its closed form: 36 tiles of 4 × 4 pixels, R = 24 replicates of 256 spp, Student's t on the
@@ -273,7 +307,9 @@ fn the_penumbra_scene_is_its_closed_form() {
     let path = format!("{}/configs/penumbra.json", env!("CARGO_MANIFEST_DIR"));
     let loaded = open(path.as_ref(), &OpenOptions::default()).unwrap();
     let scene = Scene::new(&loaded.config, loaded.mesh, (24, 24), Stage::Final).unwrap();
-    let exact = tiles(&Penumbra::standard(24, 24).unwrap().image().unwrap());
+    let pixels = with_allowance(&Penumbra::standard(24, 24).unwrap(), 8.0);
+    let part = |part: fn(&Exact) -> f64| tiles(&pixels.iter().map(part).collect::<Vec<_>>());
+    let (exact, allowance) = (part(|e| e.value), part(|e| e.allowance));
     let brightest = exact.iter().copied().fold(0.0, f64::max);
     // A lit sample adds about as much as the brightest tile's mean.
     let regions = pooled(&exact, 100.0 * brightest / (REPLICATES as f64 * f64::from(16 * SPP)));
@@ -284,10 +320,10 @@ fn the_penumbra_scene_is_its_closed_form() {
     for region in regions {
         let sum = |tiles: &[f64]| region.iter().map(|&tile| tiles[tile]).sum::<f64>();
         let sums: Vec<f64> = images.iter().map(|i| sum(i)).collect();
-        let verdict = t_test(&sums, sum(&exact), family);
+        let verdict = Exact { value: sum(&exact), allowance: sum(&allowance) }.test(&sums, family);
         assert!(verdict.holds(), "tiles {region:?}: {verdict}");
-        // A bias of 1 % of full light in any tile is caught.
-        assert!(verdict.detects.unwrap() < 0.01 * brightest, "tiles {region:?}: {verdict}");
+        // A bias of 1.5 % of full light in any tile is caught.
+        assert!(verdict.detects.unwrap() < 0.015 * brightest, "tiles {region:?}: {verdict}");
     }
 }
 
@@ -450,18 +486,20 @@ fn two_lights_add_up_and_the_sheets_shortcut_errs_as_predicted() {
     room.light(&strong, strong_emission);
     room.light(&weak, weak_emission);
     let camera = looking_at(Vec3::new(0.4, 0.4, -0.6), Vec3::new(0.1, 0.0, 0.0), 1.0);
-    let of =
-        |light: &[Vec3], emission: f32| floor_pixels(&camera, (1, 1), 0.6, polygon_light(light, emission), None)[0];
+    let of = |light: &[Vec3], emission: f32| {
+        floor_pixels(&camera, (1, 1), (5.0, 0.6), polygon_light(light, emission), None)[0]
+    };
     let (e1, e2) = (of(&strong, strong_emission), of(&weak, weak_emission));
     let (power1, power2) = (f64::from(strong_emission), f64::from(weak_emission) * 0.4 * 0.6);
     let p1 = power1 / (power1 + power2);
-    let shortcut = p1 * e1 + (1.0 - p1) * e2;
+    let shortcut = Exact::sum([e1.times(p1), e2.times(1.0 - p1)]);
+    let both = Exact::sum([e1, e2]);
     let family = Family { tests: 2, false_alarm: 1e-7 };
-    for (estimator, exact) in [(Estimator::Unbiased, e1 + e2), (Estimator::Sheet, shortcut)] {
+    for (estimator, exact) in [(Estimator::Unbiased, both), (Estimator::Sheet, shortcut)] {
         let scene = room.scene_with(&camera, (1, 1), Stage::Final, estimator);
-        let verdict = t_test(&replicates(&scene, spec("sobol"), 4096, 0..64).concat(), exact, family);
+        let verdict = exact.test(&replicates(&scene, spec("sobol"), 4096, 0..64).concat(), family);
         assert!(verdict.holds(), "{estimator:?}: {verdict}");
-        assert!(verdict.detects.unwrap() < 0.1 * (e1 + e2 - shortcut), "the two are told apart: {verdict}");
+        assert!(verdict.detects.unwrap() < 0.1 * (both.value - shortcut.value), "the two are told apart: {verdict}");
     }
 }
 
@@ -504,11 +542,11 @@ fn lights_of_1e_minus_30_and_1e30_stand_side_by_side() {
         }
         // One light alone is the picture, to 10⁻⁶⁰; 32 tests, false-alarm rate 1e-7.
         let bright = if order[0] > 1.0 { Vec3::new(0.0, 2.0, 0.0) } else { Vec3::new(1.0, 2.0, 0.0) };
-        let exact = floor_pixels(&camera, (4, 4), 0.6, polygon_light(&ceiling(bright, 0.5, 0.5), 1e30), None);
+        let exact = floor_pixels(&camera, (4, 4), (5.0, 0.6), polygon_light(&ceiling(bright, 0.5, 0.5), 1e30), None);
         let images = replicates(&scene, spec("sobol"), 64, 0..64);
         for (pixel, exact) in exact.iter().enumerate() {
             let values: Vec<f64> = images.iter().map(|i| i[pixel]).collect();
-            let verdict = t_test(&values, *exact, Family { tests: 32, false_alarm: 1e-7 });
+            let verdict = exact.test(&values, Family { tests: 32, false_alarm: 1e-7 });
             assert!(verdict.holds(), "{order:?}, pixel {pixel}: {verdict}");
         }
     }

@@ -10,6 +10,7 @@ use sampler_lab::scene::compile::{Scene, Stage};
 use sampler_lab::scene::config::{CameraConfig, Estimator, SceneConfig};
 use sampler_lab::scene::geometry::face_normal;
 use sampler_lab::scene::mesh::{Material, Mesh};
+use sampler_lab::stats::{Family, Verdict, t_test};
 
 pub fn spec(text: &str) -> SamplerSpec {
     SamplerSpec::parse(text, Preset::Best).unwrap()
@@ -115,15 +116,58 @@ pub fn polygon_light(corners: &[Vec3], emission: f32) -> PolygonLight {
     PolygonLight { corners: corners.iter().map(|c| c.as_dvec3()).collect(), emission: f64::from(emission) }
 }
 
+/// A value from a closed form, and how far off it the renderer may be by moving the ends of shadow rays.
+#[derive(Clone, Copy, Debug)]
+pub struct Exact {
+    pub value: f64,
+    pub allowance: f64,
+}
+
+impl Exact {
+    /// The same number for several values that are added up.
+    pub fn sum(parts: impl IntoIterator<Item = Self>) -> Self {
+        parts.into_iter().fold(Self { value: 0.0, allowance: 0.0 }, |a, b| Self {
+            value: a.value + b.value,
+            allowance: a.allowance + b.allowance,
+        })
+    }
+
+    pub fn times(self, factor: f64) -> Self {
+        Self { value: self.value * factor, allowance: self.allowance * factor }
+    }
+
+    /// Student's t against what the allowance leaves nearest to the replicates' mean. Where a sampler's own error is far below
+    /// 10⁻⁵, the displacement of the rays would be found otherwise, and it is there by design.
+    pub fn test(self, replicates: &[f64], family: Family) -> Verdict {
+        let mean = replicates.iter().sum::<f64>() / replicates.len() as f64;
+        t_test(replicates, mean.clamp(self.value - self.allowance, self.value + self.allowance), family)
+    }
+}
+
+/// Pixels of a soft shadow over a floor y = 0 of the given half-size by their closed form, and what they become where a shadow ray
+/// starts 2⁻¹⁸ of the floor's largest coordinate above it and ends as far below the light: seen from the moved point, blocker and
+/// light are that much lower. A quarter of the change is added for the rounding of positions (2⁻²² of the coordinates), and 64
+/// roundings of single precision.
+pub fn with_allowance(scene: &Penumbra, floor_half: f64) -> Vec<Exact> {
+    let light = scene.light();
+    let largest = light.corners.iter().fold(0.0, |m: f64, c| m.max(c.abs().max_element()));
+    let (start, end) = (floor_half / 262_144.0, largest / 262_144.0);
+    let lower = |corners: &[DVec3], by: f64| corners.iter().map(|&c| c - DVec3::Y * by).collect::<Vec<_>>();
+    let moved = PolygonLight { corners: lower(&light.corners, start + end), ..light.clone() };
+    let moved = Penumbra::new(*scene.camera(), *scene.plane(), moved, lower(scene.blocker(), start)).unwrap();
+    let both = scene.image().unwrap().into_iter().zip(moved.image().unwrap());
+    both.map(|(value, moved)| Exact { value, allowance: 1.25 * (moved - value).abs() + value / 262_144.0 }).collect()
+}
+
 /// Exact pixels of a floor y = 0 under one light, behind a blocker where there is one, by quadrature of the closed form
 /// over each pixel's square.
 pub fn floor_pixels(
     camera: &CameraConfig,
     (width, height): (u32, u32),
-    albedo: f64,
+    (floor_half, albedo): (f64, f64),
     light: PolygonLight,
     blocker: Option<&[Vec3]>,
-) -> Vec<f64> {
+) -> Vec<Exact> {
     let top = light.corners.iter().map(|c| c.y).fold(0.0, f64::max);
     // Beyond the light a blocker blocks nothing.
     let beyond = [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0)].map(|(x, z)| DVec3::new(x, 2.0 * top + 9.0, z)).to_vec();
@@ -137,5 +181,5 @@ pub fn floor_pixels(
     };
     let plane = DiffusePlane { point: DVec3::ZERO, normal: DVec3::Y, albedo };
     let blocker = blocker.map_or(beyond, |b| b.iter().map(|c| c.as_dvec3()).collect());
-    Penumbra::new(pinhole, plane, light, blocker).unwrap().image().unwrap()
+    with_allowance(&Penumbra::new(pinhole, plane, light, blocker).unwrap(), floor_half)
 }
