@@ -61,10 +61,17 @@ fn uniform_line(summary: &Summary, uniform: usize) -> Option<String> {
         let slope = crate::stats::Estimate { value: fit.slope, ci95: fit.ci95 };
         format!(", slope {}", signed_estimate(&slope))
     });
-    let (least, beaten) = beaten_by(summary, scene, uniform)?;
+    let (spp, better, others) = beaten_by(summary, scene, uniform)?;
+    let right = match unbiased {
+        0 => "right on average cannot be claimed in any scene".to_owned(),
+        n => format!("advantage: right on average in {n} of {}", super::words::scenes(cells.len())),
+    };
+    let slow = match better {
+        0 => "no other sampler is seen to do better",
+        _ => "disadvantage: slow",
+    };
     Some(format!(
-        "advantage: right on average in {unbiased} of {} (in {}: {}); disadvantage: slow{}, at {least} spp {beaten}. See {}. {}",
-        super::words::scenes(cells.len()),
+        "{right} (in {}: {}); {slow}{}: at {spp} spp {better} of {others} others have a smaller error. See {}. {}",
         scene_name(summary, scene),
         bias_short(cell),
         slope.unwrap_or_default(),
@@ -74,14 +81,14 @@ fn uniform_line(summary: &Summary, uniform: usize) -> Option<String> {
 }
 
 /// How many of the other samplers have a smaller error.
-fn beaten_by(summary: &Summary, scene: usize, uniform: usize) -> Option<(u32, String)> {
+fn beaten_by(summary: &Summary, scene: usize, uniform: usize) -> Option<(u32, usize, usize)> {
     let spp = summary.middle_spp()?;
     let base = summary.cell(scene, uniform, spp)?;
     let others: Vec<&Cell> =
         (0..summary.samplers.len()).filter(|&i| i != uniform).filter_map(|i| summary.cell(scene, i, spp)).collect();
     let better =
         others.iter().filter(|cell| rmse_ratio(cell, base).is_some_and(|r| below(&r, 1.0) == Answer::Yes)).count();
-    Some((spp, format!("{better} of {} others have a smaller error", others.len())))
+    Some((spp, better, others.len()))
 }
 
 /// RMSE against uniform sampling's in every scene.
@@ -140,15 +147,11 @@ fn literal(summary: &Summary, points: Points) -> Option<String> {
     if !stalls.is_empty() {
         parts.push(format!("stalls in {}", told(&stalls)));
     }
-    let words = match parts.as_slice() {
-        [] => "no error stays".to_owned(),
-        parts => parts.join(" and "),
-    };
-    Some(format!(
-        "Disadvantage: read literally ({}) {words} at {to} spp; see {}.",
-        name(summary, sheet),
-        link_to(titles::DECISIONS)
-    ))
+    let (who, link) = (name(summary, sheet), link_to(titles::DECISIONS));
+    Some(match parts.as_slice() {
+        [] => format!("Read literally, {who}, no wrong limit and no stall is seen at {to} spp; see {link}."),
+        parts => format!("Disadvantage: read literally, {who}, it {} at {to} spp; see {link}.", parts.join(" and ")),
+    })
 }
 
 /// Are the outputs identical?

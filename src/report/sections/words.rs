@@ -13,7 +13,7 @@ pub fn name(summary: &Summary, sampler: usize) -> String {
 
 /// A scene's name as code.
 pub fn scene_name(summary: &Summary, scene: usize) -> String {
-    format!("`{}`", summary.scenes[scene].facts.name)
+    format!("`{}`", summary.scenes[scene].name)
 }
 
 /// Row ids, shortened to what tells them apart in practice.
@@ -29,7 +29,7 @@ pub fn row(id: &str) -> String {
 
 /// Indices of the scenes with a lens, and of the others.
 pub fn scenes_by_lens(summary: &Summary) -> (Vec<usize>, Vec<usize>) {
-    (0..summary.scenes.len()).partition(|&scene| summary.scenes[scene].facts.lens)
+    (0..summary.scenes.len()).partition(|&scene| summary.scenes[scene].lens)
 }
 
 /// The scene that single numbers are quoted from: the first with a lens, else the first.
