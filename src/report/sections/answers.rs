@@ -192,6 +192,7 @@ fn helps(summary: &Summary, scene: usize) -> Option<String> {
     let even = star.map(|(ratio, n, id)| {
         format!("; the discrepancy of its {n} points is {} of uniform's (row {id})", times(&ratio))
     });
+    let ids = rows(&[summary.cell(scene, best.0, spp)?, base]);
     let words = match against_one(&best.1) {
         "less" => "it helps",
         "more" => "it does not help here",
@@ -199,7 +200,7 @@ fn helps(summary: &Summary, scene: usize) -> Option<String> {
     };
     Some(format!(
         "**Independent or correlated?** Only uniform's are independent. Within a set, points that keep apart are correlated: {words}. Smallest RMSE over uniform's in {} at \
-         {spp} spp: {} {}{}; see {}.",
+         {spp} spp: {} {} {ids}{}; see {}.",
         scene_name(summary, scene),
         name(summary, best.0),
         times(&best.1),
@@ -221,17 +222,19 @@ fn hurts(summary: &Summary) -> Option<String> {
     let alike = (0..summary.scenes.len())
         .flat_map(|scene| patterns(summary, scene).into_iter().map(move |p| (scene, p)))
         .filter(|(_, p)| p.errs_alike() == Answer::Yes && !p.cell.is_fixed)
-        .filter_map(|(scene, p)| Some((scene, p.sampler, p.cell.error_autocorrelation?)))
+        .filter_map(|(scene, p)| Some((scene, p.cell, p.cell.error_autocorrelation?)))
         .max_by(|a, b| a.2.value.total_cmp(&b.2.value));
     let mut parts = Vec::new();
     if let Some((scene, sheet, best, ratio)) = worst {
+        let most = summary.most_spp()?;
+        let ids = rows(&[summary.cell(scene, sheet, most)?, summary.cell(scene, best, most)?]);
         let words = match against_one(&ratio) {
             "more" => "Between decisions it hurts",
             "less" => "Between decisions it does not hurt here",
             _ => "Whether it hurts between decisions cannot be told",
         };
         parts.push(format!(
-            "{words}: in the worst case, {} at {} spp, the RMSE of {} is {} times that of {} ({})",
+            "{words}: in the worst case, {} at {} spp, the RMSE of {} is {} times that of {} {ids} ({})",
             scene_name(summary, scene),
             summary.most_spp()?,
             name(summary, sheet),
@@ -240,12 +243,13 @@ fn hurts(summary: &Summary) -> Option<String> {
             link_to(titles::DECISIONS)
         ));
     }
-    if let Some((scene, sampler, rho)) = alike {
+    if let Some((scene, cell, rho)) = alike {
         parts.push(format!(
-            "between pixels it turns noise into structure: {} in {} has ρ = {} ({})",
-            name(summary, sampler),
+            "between pixels it turns noise into structure: {} in {} has ρ = {} {} ({})",
+            name(summary, cell.sampler),
             scene_name(summary, scene),
             signed_estimate(&rho),
+            rows(&[cell]),
             link_to(titles::PIXELS)
         ));
     }
