@@ -135,7 +135,7 @@ fn a_wrong_limit_a_stall_and_a_falling_error_have_words_of_their_own() {
     assert!(wrong.contains("| `ld:sheet` | no (0.0100 "));
     let stalled = edited(ld, |row| set(row, 1.2e-2, estimate(1e-5, 1e-4)));
     assert!(stalled.contains("**`ld:sheet` stalls in `a01`**"), "{stalled}");
-    assert!(stalled.contains("| `ld:sheet` | on average only, it stalls ("));
+    assert!(stalled.contains("| `ld:sheet` | no bias seen, but it stalls ("));
     let falling = edited(ld, |row| set(row, 1e-1 / f64::from(row.spp.asked), estimate(1e-6, 1e-5)));
     assert!(falling.contains("- `ld:sheet` in `a01`: the error falls to 0.250 "), "{falling}");
     assert!(falling.contains("| `ld:sheet` | yes ("));

@@ -63,15 +63,15 @@ fn uniform_line(summary: &Summary, uniform: usize) -> Option<String> {
     });
     let (spp, better, others) = beaten_by(summary, scene, uniform)?;
     let right = match unbiased {
-        0 => "right on average cannot be claimed in any scene".to_owned(),
-        n => format!("advantage: right on average in {n} of {}", super::words::scenes(cells.len())),
+        0 => "that there is no bias cannot be claimed in any scene".to_owned(),
+        n => format!("advantage: no bias seen in {n} of {}", super::words::scenes(cells.len())),
     };
     let slow = match better {
         0 => "no other sampler is seen to do better",
         _ => "disadvantage: slow",
     };
     Some(format!(
-        "{right} (in {}: {}); {slow}{}: at {spp} spp {better} of {others} others have a smaller error. See {}. {}",
+        "{right} (in {}, {}); {slow}{}: at {spp} spp {better} of {others} others have a smaller error. See {}. {}",
         scene_name(summary, scene),
         bias_short(cell),
         slope.unwrap_or_default(),

@@ -79,9 +79,8 @@ fn pairing_table(summary: &Summary, page: &mut Page) {
     }
     if !stuck.is_empty() {
         sentences.push(format!(
-            "{} {} right on average, but the spread at n = {last} is more than half of that at n = {}: more samples do not help.",
+            "Of {} the mean is not told to miss, but the spread at n = {last} is more than half of that at n = {}: more samples do not help.",
             listed(&stuck),
-            if stuck.len() == 1 { "is" } else { "are" },
             pairing::COUNTS[0]
         ));
     }
@@ -201,12 +200,12 @@ fn control_sentence(summary: &Summary, scene: usize, uniform: usize) -> Option<S
     let (course, cell) = (summary.course(scene, uniform)?, summary.cell(scene, uniform, to)?);
     let mean = summary.scenes[scene].reference.as_ref().map(|r| r.mean);
     let fits = match (below(&course.rmse_ratio, course.independent), above(&course.rmse_ratio, course.independent)) {
-        (Answer::CannotTell, Answer::CannotTell) => "as independent samples do",
+        (Answer::CannotTell, Answer::CannotTell) => "not told apart from what independent samples do",
         (Answer::Yes, _) => "faster than independent samples do",
         _ => "more slowly than independent samples do",
     };
     Some(format!(
-        "The control, {}: its numbers are independent in any order; its RMSE falls to {} from {from} to {to} spp, {fits} ({}); {}. {}",
+        "The control, {}: its numbers are independent in any order; its RMSE goes to {} of what it was from {from} to {to} spp, {fits} ({}); {}. {}",
         name(summary, uniform),
         times(&course.rmse_ratio),
         short(course.independent),
@@ -283,8 +282,8 @@ pub fn between_pixels(summary: &Summary, page: &mut Page) {
         .flat_map(|scene| patterns(summary, scene).into_iter().map(move |p| (scene, p)))
         .collect();
     page.paragraph(&format!(
-        "ρ is the correlation between the errors of neighbouring pixels at {spp} spp. A sampler that shows every pixel the same points (or one axis of them) makes neighbours err \
-         alike: noise becomes structure, which the eye sees more readily and which does not average out over an area (right column: spread of the whole \
+        "ρ is the correlation between the errors of neighbouring pixels at {spp} spp. A sampler that shows every pixel the same points (or one axis of them) may make neighbours err \
+         alike: then noise becomes structure, which the eye sees more readily and which does not average out over an area (right column: spread of the whole \
          image's mean between replicates)."
     ));
     neighbours_table(summary, spp, page);
@@ -374,7 +373,7 @@ fn picture_correlations(summary: &Summary, page: &mut Page) {
     let others =
         if new.is_empty() { String::new() } else { format!(" With new points in each pixel: {}.", told(&new)) };
     page.paragraph(&format!(
-        "On the pictures ({size}, one image each, so without intervals; finer pixels have neighbours that are more alike): {}.{others}",
+        "On the pictures ({size}, one image each, so without intervals): {}.{others}",
         told(&same)
     ));
 }
