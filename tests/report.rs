@@ -135,7 +135,7 @@ fn a_wrong_limit_a_stall_and_a_falling_error_have_words_of_their_own() {
     assert!(wrong.contains("| `ld:sheet` | no (0.0100 "));
     let stalled = edited(ld, |row| set(row, 1.2e-2, estimate(1e-5, 1e-4)));
     assert!(stalled.contains("**`ld:sheet` stalls in `a01`**"), "{stalled}");
-    assert!(stalled.contains("| `ld:sheet` | on average only, it stalls ("));
+    assert!(stalled.contains("| `ld:sheet` | no bias seen, but it stalls ("));
     let falling = edited(ld, |row| set(row, 1e-1 / f64::from(row.spp.asked), estimate(1e-6, 1e-5)));
     assert!(falling.contains("- `ld:sheet` in `a01`: the error falls to 0.250 "), "{falling}");
     assert!(falling.contains("| `ld:sheet` | yes ("));
@@ -229,4 +229,61 @@ fn pictures_without_images_are_said_to_be_missing_and_an_earlier_figure_is_kept(
     std::fs::write(folder.path().join("figures/errors.png"), b"an earlier figure").unwrap();
     assert!(report(&folder).contains("the picture is that of the run that made them"));
     assert_eq!(std::fs::read(folder.path().join("figures/errors.png")).unwrap(), b"an earlier figure");
+}
+
+#[test]
+fn neighbours_that_err_alike_are_told_from_those_that_do_not() {
+    let fixed = |sampler: &str, _| sampler == "halton:sheet";
+    let rho = |value: f64| Some(Estimate::without_interval(value));
+    let alike = edited(fixed, |row| row.error_autocorrelation = rho(0.9));
+    assert!(
+        alike.contains("**In `a01` neighbours err more alike under `halton:sheet`**: ρ = +0.90 (no interval)"),
+        "{alike}"
+    );
+    assert!(alike.contains("- `halton:sheet` in `a01`: structure instead of noise"));
+    let not = edited(fixed, |row| row.error_autocorrelation = rho(0.0));
+    assert!(not.contains("Whether neighbours err more alike in `a01` under `halton:sheet` cannot be told"), "{not}");
+    assert!(!not.contains("structure instead of noise"));
+    let less = edited(fixed, |row| row.error_autocorrelation = rho(-0.9));
+    assert!(
+        less.contains("In `a01` neighbours err less alike under `halton:sheet` than under `halton:best`"),
+        "{less}"
+    );
+}
+
+#[test]
+fn equal_pixels_are_called_identical() {
+    let mut rows = rows();
+    let before = text(&summary(&rows), &Figures::default());
+    assert!(before.contains("No two of the 5 samplers' images of `a01` at 64 spp are the same"), "{before}");
+    for row in &mut rows {
+        if let Row::Image(row) = row
+            && (row.sampler == "ld:sheet" || row.sampler == "halton:sheet")
+        {
+            row.pixels = "one picture".to_owned();
+        }
+    }
+    let after = text(&summary(&rows), &Figures::default());
+    assert!(
+        after.contains("have 4 different digests; bit for bit the same: `halton:sheet` and `ld:sheet`."),
+        "{after}"
+    );
+}
+
+#[test]
+fn one_replicate_of_a_random_sampler_has_no_interval_and_no_verdict() {
+    // The row's interval holds the reference's noise alone: it must not pass for the sampler's.
+    let report = edited(|sampler, _| sampler == "ld:sheet", |row| row.replicates = 1);
+    assert!(report.contains("| `ld:sheet` | cannot tell ("), "{report}");
+    let line = report.lines().find(|line| line.starts_with("| `a01` | `ld:sheet` |")).unwrap();
+    assert!(line.contains("(no interval)"), "{line}");
+}
+
+#[test]
+fn an_experiment_without_a_lens_says_nothing_of_one() {
+    let mut about = read_about(&stored().join("experiment.json")).unwrap();
+    about.scenes[0].lens = false;
+    let report = text(&summarise(&rows(), &timings(), &about), &Figures::default());
+    assert!(report.contains("No scene of this experiment has a lens"));
+    assert!(!report.contains("(with a lens)"));
 }

@@ -119,7 +119,7 @@ fn panel(summary: &Summary, scene: usize, samplers: &[usize], words: &str) -> Pl
     let scene = &summary.scenes[scene];
     let floor = scene.reference_rmse().filter(|&rmse| rmse > 0.0);
     Plot {
-        title: format!("{}{words}", scene.facts.name),
+        title: format!("{}{words}", scene.name),
         series: samplers.iter().filter_map(of).collect(),
         guides: vec![guide(-0.5, "slope −1/2"), guide(-1.0, "slope −1")],
         floor: floor.map(|value| Floor { value, label: "reference noise".to_owned() }),
@@ -138,7 +138,7 @@ pub fn bias_and_variance(summary: &Summary) -> Option<Figure> {
                 Some(BiasVariance::of_sampler(label, estimate(cell.bias2), cell.variance.map(estimate)))
             };
             let rows = (0..summary.samplers.len()).filter_map(row).collect();
-            Group { title: summary.scenes[scene].facts.name.clone(), rows }
+            Group { title: summary.scenes[scene].name.clone(), rows }
         })
         .filter(|group: &Group| !group.rows.is_empty())
         .collect();
@@ -149,6 +149,12 @@ pub fn bias_and_variance(summary: &Summary) -> Option<Figure> {
     let axes = ["squared radiance, mean over pixels and channels", ""];
     let title = format!("Bias² and variance at {most} spp");
     Some(bias_variance_chart(&frame(summary, &title, &subtitle, axes), &groups))
+}
+
+/// What the speed chart of a scene is called in `figures/`: letters, digits and `.-_` alone, so that every viewer finds it.
+pub fn speed_name(scene: &str) -> String {
+    let plain = |c: char| if c.is_ascii_alphanumeric() || ".-_".contains(c) { c } else { '-' };
+    format!("speed-{}", scene.chars().map(plain).collect::<String>())
 }
 
 /// Seconds against RMSE of one scene; `None` where nothing was timed.
@@ -169,7 +175,7 @@ pub fn speed(summary: &Summary, scene: usize) -> Option<Figure> {
     if trials.is_empty() {
         return None;
     }
-    let name = &summary.scenes[scene].facts.name;
+    let name = &summary.scenes[scene].name;
     let mut threads: Vec<String> = summary.speeds.iter().map(|speed| speed.threads.to_string()).collect();
     threads.sort();
     threads.dedup();

@@ -1,6 +1,6 @@
 //! Reports: figures, tables and sentences out of rows. Nothing here renders.
 //!
-//! [`write()`] is the whole of it: rows → [`summarise`] → figures, tables, `report.md`.
+//! [`write()`] is the whole of it: rows → [`summarise()`] → figures, tables, `report.md`.
 pub mod bias_variance;
 pub mod evidence;
 pub mod figure;

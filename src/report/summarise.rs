@@ -5,7 +5,6 @@
 
 use std::collections::HashMap;
 
-use crate::experiment::backend::{SceneFacts, Size};
 use crate::experiment::results::{About, Count, EnsembleRow, ImageRow, Kind, PointsRow, ReferenceRow, Row, Timing};
 use crate::experiment::spec::Experiment;
 use crate::sampling::{Decision, Order, Points, Preset, Random, SamplerSpec, Scope};
@@ -49,10 +48,18 @@ pub struct Summary {
 /// A scene and what its images are compared with.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneSummary {
-    /// What the runner knows of it.
-    pub facts: SceneFacts,
-    /// Size of the compared images.
-    pub size: Size,
+    /// Its name.
+    pub name: String,
+    /// Its decisions and the dimensions they read, in words.
+    pub layout: String,
+    /// Whether there is a lens to sample.
+    pub lens: bool,
+    /// Whether its reference is a closed form.
+    pub has_closed_form: bool,
+    /// Size of the compared images, `WxH`.
+    pub size: String,
+    /// Their number of pixels.
+    pub pixels: u64,
     /// Its reference; `None` where that row is missing.
     pub reference: Option<ReferenceRow>,
 }
@@ -264,7 +271,7 @@ pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
     let samplers = samplers(&about.experiment);
     let mut summary = Summary {
         about: about.clone(),
-        scenes: about.scenes.iter().zip(&about.experiment.scenes).map(|(f, n)| index.scene(f, n, about)).collect(),
+        scenes: (0..about.scenes.len()).map(|i| index.scene(about, i)).collect(),
         samplers,
         cells: Vec::new(),
         slopes: Vec::new(),
@@ -361,16 +368,24 @@ impl<'a> Index<'a> {
         index
     }
 
-    /// A scene with the reference that its ensembles were compared with.
-    fn scene(&self, facts: &SceneFacts, name: &str, about: &About) -> SceneSummary {
-        let size = about.experiment.size.of(name, facts.size);
+    /// Scene `i` with the reference that its ensembles were compared with.
+    fn scene(&self, about: &About, i: usize) -> SceneSummary {
+        let facts = &about.scenes[i];
+        let size = about.experiment.scenes.get(i).map_or(facts.size, |name| about.experiment.size.of(name, facts.size));
         let used = self.ensembles.values().find(|row| row.scene == facts.name && row.size == size);
         let by_id = used.and_then(|row| self.references.get(row.reference_id.as_str()).copied());
         let mut by_size: Vec<_> =
             self.references.values().filter(|row| row.scene == facts.name && row.size == size).copied().collect();
         by_size.sort_by(|a, b| a.id.cmp(&b.id));
-        let reference = by_id.or(by_size.first().copied()).cloned();
-        SceneSummary { facts: facts.clone(), size, reference }
+        SceneSummary {
+            name: facts.name.clone(),
+            layout: facts.layout.clone(),
+            lens: facts.lens,
+            has_closed_form: facts.exact_reference,
+            size: size.to_string(),
+            pixels: size.pixels(),
+            reference: by_id.or(by_size.first().copied()).cloned(),
+        }
     }
 
     /// One cell for each ensemble that is there; the others are missing.
@@ -380,11 +395,11 @@ impl<'a> Index<'a> {
             for sampler in 0..summary.samplers.len() {
                 for &asked in &summary.about.experiment.spp {
                     let (s, p) = (&summary.scenes[scene], &summary.samplers[sampler]);
-                    match self.ensembles.get(&(s.facts.name.as_str(), p.canonical.as_str(), asked)) {
+                    match self.ensembles.get(&(s.name.as_str(), p.canonical.as_str(), asked)) {
                         Some(row) => summary.cells.push(self.cell(row, scene, sampler, s, p)),
                         None => {
                             missing += 1;
-                            first.get_or_insert_with(|| format!("{}, {}, {asked} spp", s.facts.name, p.label));
+                            first.get_or_insert_with(|| format!("{}, {}, {asked} spp", s.name, p.label));
                         }
                     }
                 }
@@ -392,7 +407,7 @@ impl<'a> Index<'a> {
         }
         let of = summary.cells.len() + missing;
         let references = summary.scenes.iter().filter(|scene| scene.reference.is_none());
-        summary.missing.extend(references.map(|scene| format!("the reference of {}", scene.facts.name)));
+        summary.missing.extend(references.map(|scene| format!("the reference of {}", scene.name)));
         if let Some(first) = first {
             let what = format!("{missing} of {of} comparisons of a sampler with its reference (the first: {first})");
             summary.missing.push(what);
@@ -402,8 +417,8 @@ impl<'a> Index<'a> {
     fn cell(&self, row: &EnsembleRow, scene: usize, sampler: usize, s: &SceneSummary, p: &SamplerSummary) -> Cell {
         let members: Vec<&ImageRow> =
             row.members.iter().filter_map(|id| self.images.get(id.as_str()).copied()).collect();
-        let is_fixed = row.replicates == 1 && is_fixed(p, &s.facts);
-        let is_exact = is_fixed && s.facts.exact_reference;
+        let is_fixed = row.replicates == 1 && is_fixed(p, s);
+        let is_exact = is_fixed && s.has_closed_form;
         // A single image of a random sampler: the row's interval holds the reference's noise alone, not its own.
         let known = |e: Estimate| match (row.replicates, is_exact) {
             (1, true) => Estimate { ci95: e.ci95.or(Some([e.value; 2])), ..e },
@@ -478,7 +493,7 @@ impl<'a> Index<'a> {
         let by_id: HashMap<&str, &Timing> = timings.iter().map(|timing| (timing.id.as_str(), timing)).collect();
         for cell in &summary.cells {
             let (s, p) = (&summary.scenes[cell.scene], &summary.samplers[cell.sampler]);
-            let key = (s.facts.name.as_str(), p.canonical.as_str(), cell.spp.asked);
+            let key = (s.name.as_str(), p.canonical.as_str(), cell.spp.asked);
             let members = self.ensembles.get(&key).into_iter().flat_map(|row| &row.members);
             let timed: Vec<&Timing> = members.filter_map(|id| by_id.get(id.as_str()).copied()).collect();
             let Some(seconds) = median(timed.iter().map(|timing| timing.seconds).collect()) else { continue };
@@ -490,7 +505,7 @@ impl<'a> Index<'a> {
 }
 
 /// Whether another seed gives the same image: the sheet's 1-D samplers are jittered also where its 2-D ones are not.
-fn is_fixed(sampler: &SamplerSummary, scene: &SceneFacts) -> bool {
+fn is_fixed(sampler: &SamplerSummary, scene: &SceneSummary) -> bool {
     let has_1d = scene.layout.contains(Decision::LightPick.name());
     sampler.spec.is_some_and(|spec| !(spec.is_random() || spec.sheet_1d && has_1d))
 }

@@ -25,7 +25,7 @@ pub fn summary_csv(summary: &Summary) -> String {
 fn cell_line(summary: &Summary, cell: &Cell) -> String {
     let (scene, sampler) = (&summary.scenes[cell.scene], &summary.samplers[cell.sampler]);
     let mut line = [
-        quoted(&scene.facts.name),
+        quoted(&scene.name),
         quoted(&sampler.names.join(" = ")),
         quoted(&sampler.canonical),
         cell.id.clone(),
@@ -58,7 +58,7 @@ pub fn slopes_csv(summary: &Summary) -> String {
     text += "scene,sampler,stands_for,slope,slope_low,slope_high,points,interval,counts\n";
     for slope in &summary.slopes {
         let (scene, sampler) = (&summary.scenes[slope.scene], &summary.samplers[slope.sampler]);
-        let names = [quoted(&scene.facts.name), quoted(&sampler.names.join(" = ")), quoted(&sampler.canonical)];
+        let names = [quoted(&scene.name), quoted(&sampler.names.join(" = ")), quoted(&sampler.canonical)];
         text += &names.join(",");
         let fit = slope.fit.as_ref();
         // Six digits, as all intervals: resampling deserves no more.

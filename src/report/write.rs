@@ -98,7 +98,7 @@ fn draw(dir: &Path, summary: &Summary) -> Result<Figures> {
     pen.chart("convergence", charts::convergence(summary))?;
     pen.chart("bias-and-variance", charts::bias_and_variance(summary))?;
     for (i, scene) in summary.scenes.iter().enumerate() {
-        pen.chart(&format!("speed-{}", scene.facts.name), charts::speed(summary, i))?;
+        pen.chart(&charts::speed_name(&scene.name), charts::speed(summary, i))?;
     }
     if summary.stages.len() == 4 {
         pen.raster("stages", pictured::stages(dir, summary).map_err(|e| e.to_string()))?;

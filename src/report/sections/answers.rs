@@ -61,10 +61,17 @@ fn uniform_line(summary: &Summary, uniform: usize) -> Option<String> {
         let slope = crate::stats::Estimate { value: fit.slope, ci95: fit.ci95 };
         format!(", slope {}", signed_estimate(&slope))
     });
-    let (least, beaten) = beaten_by(summary, scene, uniform)?;
+    let (spp, better, others) = beaten_by(summary, scene, uniform)?;
+    let right = match unbiased {
+        0 => "that there is no bias cannot be claimed in any scene".to_owned(),
+        n => format!("advantage: no bias seen in {n} of {}", super::words::scenes(cells.len())),
+    };
+    let slow = match better {
+        0 => "no other sampler is seen to do better",
+        _ => "disadvantage: slow",
+    };
     Some(format!(
-        "advantage: right on average in {unbiased} of {} (in {}: {}); disadvantage: slow{}, at {least} spp {beaten}. See {}. {}",
-        super::words::scenes(cells.len()),
+        "{right} (in {}, {}); {slow}{}: at {spp} spp {better} of {others} others have a smaller error. See {}. {}",
         scene_name(summary, scene),
         bias_short(cell),
         slope.unwrap_or_default(),
@@ -74,14 +81,14 @@ fn uniform_line(summary: &Summary, uniform: usize) -> Option<String> {
 }
 
 /// How many of the other samplers have a smaller error.
-fn beaten_by(summary: &Summary, scene: usize, uniform: usize) -> Option<(u32, String)> {
+fn beaten_by(summary: &Summary, scene: usize, uniform: usize) -> Option<(u32, usize, usize)> {
     let spp = summary.middle_spp()?;
     let base = summary.cell(scene, uniform, spp)?;
     let others: Vec<&Cell> =
         (0..summary.samplers.len()).filter(|&i| i != uniform).filter_map(|i| summary.cell(scene, i, spp)).collect();
     let better =
         others.iter().filter(|cell| rmse_ratio(cell, base).is_some_and(|r| below(&r, 1.0) == Answer::Yes)).count();
-    Some((spp, format!("{better} of {} others have a smaller error", others.len())))
+    Some((spp, better, others.len()))
 }
 
 /// RMSE against uniform sampling's in every scene.
@@ -140,15 +147,11 @@ fn literal(summary: &Summary, points: Points) -> Option<String> {
     if !stalls.is_empty() {
         parts.push(format!("stalls in {}", told(&stalls)));
     }
-    let words = match parts.as_slice() {
-        [] => "no error stays".to_owned(),
-        parts => parts.join(" and "),
-    };
-    Some(format!(
-        "Disadvantage: read literally ({}) {words} at {to} spp; see {}.",
-        name(summary, sheet),
-        link_to(titles::DECISIONS)
-    ))
+    let (who, link) = (name(summary, sheet), link_to(titles::DECISIONS));
+    Some(match parts.as_slice() {
+        [] => format!("Read literally, {who}, no wrong limit and no stall is seen at {to} spp; see {link}."),
+        parts => format!("Disadvantage: read literally, {who}, it {} at {to} spp; see {link}.", parts.join(" and ")),
+    })
 }
 
 /// Are the outputs identical?
@@ -189,6 +192,7 @@ fn helps(summary: &Summary, scene: usize) -> Option<String> {
     let even = star.map(|(ratio, n, id)| {
         format!("; the discrepancy of its {n} points is {} of uniform's (row {id})", times(&ratio))
     });
+    let ids = rows(&[summary.cell(scene, best.0, spp)?, base]);
     let words = match against_one(&best.1) {
         "less" => "it helps",
         "more" => "it does not help here",
@@ -196,7 +200,7 @@ fn helps(summary: &Summary, scene: usize) -> Option<String> {
     };
     Some(format!(
         "**Independent or correlated?** Only uniform's are independent. Within a set, points that keep apart are correlated: {words}. Smallest RMSE over uniform's in {} at \
-         {spp} spp: {} {}{}; see {}.",
+         {spp} spp: {} {} {ids}{}; see {}.",
         scene_name(summary, scene),
         name(summary, best.0),
         times(&best.1),
@@ -218,17 +222,19 @@ fn hurts(summary: &Summary) -> Option<String> {
     let alike = (0..summary.scenes.len())
         .flat_map(|scene| patterns(summary, scene).into_iter().map(move |p| (scene, p)))
         .filter(|(_, p)| p.errs_alike() == Answer::Yes && !p.cell.is_fixed)
-        .filter_map(|(scene, p)| Some((scene, p.sampler, p.cell.error_autocorrelation?)))
+        .filter_map(|(scene, p)| Some((scene, p.cell, p.cell.error_autocorrelation?)))
         .max_by(|a, b| a.2.value.total_cmp(&b.2.value));
     let mut parts = Vec::new();
     if let Some((scene, sheet, best, ratio)) = worst {
+        let most = summary.most_spp()?;
+        let ids = rows(&[summary.cell(scene, sheet, most)?, summary.cell(scene, best, most)?]);
         let words = match against_one(&ratio) {
             "more" => "Between decisions it hurts",
             "less" => "Between decisions it does not hurt here",
             _ => "Whether it hurts between decisions cannot be told",
         };
         parts.push(format!(
-            "{words}: in the worst case, {} at {} spp, the RMSE of {} is {} times that of {} ({})",
+            "{words}: in the worst case, {} at {} spp, the RMSE of {} is {} times that of {} {ids} ({})",
             scene_name(summary, scene),
             summary.most_spp()?,
             name(summary, sheet),
@@ -237,12 +243,13 @@ fn hurts(summary: &Summary) -> Option<String> {
             link_to(titles::DECISIONS)
         ));
     }
-    if let Some((scene, sampler, rho)) = alike {
+    if let Some((scene, cell, rho)) = alike {
         parts.push(format!(
-            "between pixels it turns noise into structure: {} in {} has ρ = {} ({})",
-            name(summary, sampler),
+            "between pixels it turns noise into structure: {} in {} has ρ = {} {} ({})",
+            name(summary, cell.sampler),
             scene_name(summary, scene),
             signed_estimate(&rho),
+            rows(&[cell]),
             link_to(titles::PIXELS)
         ));
     }

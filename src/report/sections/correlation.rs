@@ -24,8 +24,8 @@ pub fn between_decisions(summary: &Summary, page: &mut Page) {
     }
     page.paragraph(
         "Read literally, the sheet lets every decision walk through the same set in the same order: sample i takes the i-th point for the pixel, \
-         the i-th for the lens and the i-th for the light. Each decision alone is sampled evenly, but only pairs (u, u) of the square of \
-         squares are ever seen.",
+         the i-th for the lens and the i-th for the light. Each decision alone is sampled evenly, but one decision's point tells the next one's, \
+         and most combinations are never seen.",
     );
     pairing_table(summary, page);
     let (with, without) = scenes_by_lens(summary);
@@ -79,9 +79,8 @@ fn pairing_table(summary: &Summary, page: &mut Page) {
     }
     if !stuck.is_empty() {
         sentences.push(format!(
-            "{} {} right on average, but the spread at n = {last} is more than half of that at n = {}: more samples do not help.",
+            "Of {} the mean is not told to miss, but the spread at n = {last} is more than half of that at n = {}: more samples do not help.",
             listed(&stuck),
-            if stuck.len() == 1 { "is" } else { "are" },
             pairing::COUNTS[0]
         ));
     }
@@ -96,8 +95,8 @@ fn scene_block(summary: &Summary, scene: usize, pairs: &[(usize, usize)], page: 
     let Some((from, to)) = summary.course_counts() else {
         return page.paragraph("One count of samples tells no course of an error.");
     };
-    let lens = if summary.scenes[scene].facts.lens { "with a lens" } else { "without a lens" };
-    page.heading(4, &format!("{} ({lens})", summary.scenes[scene].facts.name));
+    let lens = if summary.scenes[scene].lens { "with a lens" } else { "without a lens" };
+    page.heading(4, &format!("{} ({lens})", summary.scenes[scene].name));
     let lines: Vec<Vec<String>> =
         (0..summary.samplers.len()).filter_map(|sampler| course_row(summary, scene, sampler, from, to)).collect();
     let head = [
@@ -201,12 +200,12 @@ fn control_sentence(summary: &Summary, scene: usize, uniform: usize) -> Option<S
     let (course, cell) = (summary.course(scene, uniform)?, summary.cell(scene, uniform, to)?);
     let mean = summary.scenes[scene].reference.as_ref().map(|r| r.mean);
     let fits = match (below(&course.rmse_ratio, course.independent), above(&course.rmse_ratio, course.independent)) {
-        (Answer::CannotTell, Answer::CannotTell) => "as independent samples do",
+        (Answer::CannotTell, Answer::CannotTell) => "not told apart from what independent samples do",
         (Answer::Yes, _) => "faster than independent samples do",
         _ => "more slowly than independent samples do",
     };
     Some(format!(
-        "The control, {}: its numbers are independent in any order; its RMSE falls to {} from {from} to {to} spp, {fits} ({}); {}. {}",
+        "The control, {}: its numbers are independent in any order; its RMSE goes to {} of what it was from {from} to {to} spp, {fits} ({}); {}. {}",
         name(summary, uniform),
         times(&course.rmse_ratio),
         short(course.independent),
@@ -283,10 +282,21 @@ pub fn between_pixels(summary: &Summary, page: &mut Page) {
         .flat_map(|scene| patterns(summary, scene).into_iter().map(move |p| (scene, p)))
         .collect();
     page.paragraph(&format!(
-        "ρ is the correlation between the errors of neighbouring pixels at {spp} spp. A sampler that shows every pixel the same points (or one axis of them) makes neighbours err \
-         alike: noise becomes structure, which the eye sees more readily and which does not average out over an area (right column: spread of the whole \
+        "ρ is the correlation between the errors of neighbouring pixels at {spp} spp. A sampler that shows every pixel the same points (or one axis of them) may make neighbours err \
+         alike: then noise becomes structure, which the eye sees more readily and which does not average out over an area (right column: spread of the whole \
          image's mean between replicates)."
     ));
+    neighbours_table(summary, spp, page);
+    if all.is_empty() {
+        page.paragraph("No sampler of this experiment shows every pixel the same points beside one that does not.");
+    }
+    let items: Vec<String> = all.iter().map(|(scene, pattern)| pattern_sentence(summary, *scene, pattern)).collect();
+    page.bullets(&items);
+    picture_correlations(summary, page);
+}
+
+/// ρ of every sampler in every scene.
+fn neighbours_table(summary: &Summary, spp: u32, page: &mut Page) {
     let repeats: Vec<usize> =
         (0..summary.samplers.len()).filter(|&i| summary.samplers[i].repeats_in_every_pixel()).collect();
     let lines: Vec<Vec<String>> = (0..summary.scenes.len())
@@ -310,21 +320,15 @@ pub fn between_pixels(summary: &Summary, page: &mut Page) {
         })
         .collect();
     page.table(&["scene", "sampler", "points", "ρ", "RMSE", "spread of the mean", "row"], &lines);
-    if all.is_empty() {
-        page.paragraph("No sampler of this experiment shows every pixel the same points beside one that does not.");
-    }
-    let items: Vec<String> = all.iter().map(|(scene, pattern)| pattern_sentence(summary, *scene, pattern)).collect();
-    page.bullets(&items);
-    picture_correlations(summary, page);
 }
 
 fn pattern_sentence(summary: &Summary, scene: usize, p: &Pattern) -> String {
     let (own, other, at) = (name(summary, p.sampler), name(summary, p.twin), scene_name(summary, scene));
     let rho = |cell: &Cell| cell.error_autocorrelation.map_or("undefined".to_owned(), |rho| signed_estimate(&rho));
     let verdict = match p.errs_alike() {
-        Answer::Yes => format!("**in {at} neighbours err alike under {own}**"),
-        Answer::No => format!("in {at} neighbours err less alike under {own} than under {other}"),
-        Answer::CannotTell => format!("whether neighbours err more alike in {at} under {own} cannot be told"),
+        Answer::Yes => format!("**In {at} neighbours err more alike under {own}**"),
+        Answer::No => format!("In {at} neighbours err less alike under {own} than under {other}"),
+        Answer::CannotTell => format!("Whether neighbours err more alike in {at} under {own} cannot be told"),
     };
     let error = rmse_ratio(p.cell, p.other).map_or(String::new(), |ratio| {
         let words = match against_one(&ratio) {
@@ -369,7 +373,7 @@ fn picture_correlations(summary: &Summary, page: &mut Page) {
     let others =
         if new.is_empty() { String::new() } else { format!(" With new points in each pixel: {}.", told(&new)) };
     page.paragraph(&format!(
-        "On the pictures ({size}, one image each, so without intervals; finer pixels have neighbours that are more alike): {}.{others}",
+        "On the pictures ({size}, one image each, so without intervals): {}.{others}",
         told(&same)
     ));
 }

@@ -130,7 +130,7 @@ fn stability(summary: &Summary, page: &mut Page) {
 /// The table of advantages and disadvantages: every cell a measured predicate.
 pub fn table(summary: &Summary, page: &mut Page) {
     page.heading(2, titles::TABLE);
-    page.paragraph("Every cell is computed from rows; none is an opinion.");
+    page.paragraph("Every cell is computed from rows; none is an opinion. \"yes\" below: the error falls and no bias is seen, within the interval given.");
     let scenes: Vec<String> = (0..summary.scenes.len()).map(|scene| scene_name(summary, scene)).collect();
     let per_scene = |title: String, cell: &dyn Fn(usize, usize) -> String, page: &mut Page| {
         let mut head = vec![title];
@@ -160,7 +160,7 @@ fn right_image(summary: &Summary, scene: usize, sampler: usize, to: u32) -> Stri
     };
     let word = match (course.limit(), course.is_biased()) {
         (Limit::Wrong, _) => "no",
-        (Limit::Stalls, _) => "on average only, it stalls",
+        (Limit::Stalls, _) => "no bias seen, but it stalls",
         (Limit::Falls, Answer::No) => "yes",
         (Limit::Falls, Answer::Yes) if cell.is_fixed => "its error falls (all of it bias)",
         (Limit::Falls, Answer::Yes) => "its error falls, but it is biased",

@@ -130,6 +130,11 @@ fn means(summary: &Summary, scene: usize, most: u32, page: &mut Page) {
         .collect();
     let title = format!("{}, {most} spp", scene_name(summary, scene));
     page.table(&[&title, "error of the mean (%)", &format!("within {} %", 100.0 * EQUIVALENT), "p", "row"], &lines);
+    page.sentences(&means_sentences(summary, scene, &cells));
+}
+
+/// Which means agree, and whether one hides a wrong image.
+fn means_sentences(summary: &Summary, scene: usize, cells: &[&Cell]) -> [String; 2] {
     let off: Vec<String> = cells
         .iter()
         .filter(|cell| relative_bias(summary, cell).is_some_and(|bias| equivalent(&bias) == "no"))
@@ -169,7 +174,7 @@ fn means(summary: &Summary, scene: usize, most: u32, page: &mut Page) {
             listed(list)
         ),
     };
-    page.sentences(&[words, hidden]);
+    [words, hidden]
 }
 
 fn agree(n: usize) -> String {

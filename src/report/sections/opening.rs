@@ -26,7 +26,7 @@ pub fn title(summary: &Summary, page: &mut Page) {
 pub fn what_was_run(summary: &Summary, page: &mut Page) {
     page.heading(2, "What was run");
     let e = &summary.about.experiment;
-    let names: Vec<String> = summary.scenes.iter().map(|s| format!("`{}` at {}", s.facts.name, s.size)).collect();
+    let names: Vec<String> = summary.scenes.iter().map(|s| format!("`{}` at {}", s.name, s.size)).collect();
     let spp: Vec<String> = e.spp.iter().map(u32::to_string).collect();
     let mut items = vec![
         format!("{}: {}.", counted(names.len(), "scene", "scenes"), listed(&names)),
@@ -111,9 +111,9 @@ pub fn scenes_and_samplers(summary: &Summary, page: &mut Page) {
         .map(|scene| {
             let reference = scene.reference.as_ref();
             vec![
-                format!("`{}`", scene.facts.name),
-                scene.facts.layout.clone(),
-                if scene.facts.lens { "yes" } else { "no" }.to_owned(),
+                format!("`{}`", scene.name),
+                scene.layout.clone(),
+                if scene.lens { "yes" } else { "no" }.to_owned(),
                 scene.size.to_string(),
                 reference.map_or("missing".to_owned(), |r| short(r.mean)),
                 match reference {

@@ -136,6 +136,11 @@ pub fn within(summary: &Summary, page: &mut Page) {
         sentences.push(format!("For {} the interval does not say so.", listed(&not)));
     }
     page.sentences(&sentences);
+    evenness_table(summary, &compared, n, page);
+}
+
+/// Evenness at `n` points, sampler by sampler.
+fn evenness_table(summary: &Summary, compared: &[(usize, Estimate, u32, String)], n: u32, page: &mut Page) {
     let metric = |sampler: usize, metric: &str| -> Vec<Option<f64>> {
         let sets = summary.point_sets.iter();
         let found =

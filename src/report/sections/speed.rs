@@ -2,6 +2,7 @@
 
 use crate::stats::Estimate;
 
+use super::super::charts::speed_name;
 use super::super::evidence::{interpolated, ratio, ratio_of_roots};
 use super::super::markdown::Page;
 use super::super::numbers::{counted, estimate, listed, short};
@@ -31,12 +32,12 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
         listed(&threads)
     ));
     for scene in 0..summary.scenes.len() {
-        let facts = &summary.scenes[scene].facts;
+        let scene_file = &summary.scenes[scene].name;
         let caption = format!(
             "`{}`: median seconds an image against RMSE, one mark a sampler and count, on the front by name; bars: range of the seconds and 95 % interval of the RMSE.",
-            facts.name
+            scene_file
         );
-        show(page, figures, &format!("speed-{}", facts.name), true, &caption);
+        show(page, figures, &speed_name(scene_file), true, &caption);
         page.sentences(&[front_sentence(summary, scene).unwrap_or_default()]);
         efficiency_table(summary, scene, page);
         equal_seconds(summary, scene, page);
@@ -106,7 +107,7 @@ fn efficiency_table(summary: &Summary, scene: usize, page: &mut Page) {
     let lines: Vec<Vec<String>> = (0..summary.samplers.len())
         .filter_map(of)
         .map(|(cell, speed, efficiency)| {
-            let pixels = summary.scenes[scene].size.pixels() as f64;
+            let pixels = summary.scenes[scene].pixels as f64;
             let rate = scaled(&inverse(&speed.seconds), pixels * f64::from(cell.spp.taken) / 1e6);
             let relative = base.and_then(|(.., base)| ratio(&efficiency, &base));
             let is_base = Some(cell.sampler) == summary.uniform();

@@ -13,7 +13,7 @@ pub fn name(summary: &Summary, sampler: usize) -> String {
 
 /// A scene's name as code.
 pub fn scene_name(summary: &Summary, scene: usize) -> String {
-    format!("`{}`", summary.scenes[scene].facts.name)
+    format!("`{}`", summary.scenes[scene].name)
 }
 
 /// Row ids, shortened to what tells them apart in practice.
@@ -29,7 +29,7 @@ pub fn row(id: &str) -> String {
 
 /// Indices of the scenes with a lens, and of the others.
 pub fn scenes_by_lens(summary: &Summary) -> (Vec<usize>, Vec<usize>) {
-    (0..summary.scenes.len()).partition(|&scene| summary.scenes[scene].facts.lens)
+    (0..summary.scenes.len()).partition(|&scene| summary.scenes[scene].lens)
 }
 
 /// The scene that single numbers are quoted from: the first with a lens, else the first.
@@ -42,7 +42,7 @@ pub fn main_scene(summary: &Summary) -> Option<usize> {
 pub fn limit_words(course: &Course) -> &'static str {
     match (course.limit(), course.is_biased()) {
         (Limit::Wrong, _) => "converges to a wrong image",
-        (Limit::Stalls, _) => "right on average, but stalls",
+        (Limit::Stalls, _) => "stalls, no bias seen",
         (Limit::Falls, Answer::Yes) => "error falls, but biased",
         (Limit::Falls, Answer::No) => "error falls, no bias seen",
         (Limit::Falls, Answer::CannotTell) => "error falls, perhaps biased",
