@@ -206,6 +206,15 @@ impl Summary {
         self.slopes.iter().find(|s| s.scene == scene && s.sampler == sampler)
     }
 
+    /// How many stages Figure 1 has: four, or three where the pictures' scene has no lens to sample.
+    pub fn stages_planned(&self) -> usize {
+        let experiment = &self.about.experiment;
+        let scene = experiment.pictures.as_ref().map(|pictures| &pictures.scene);
+        let at = experiment.scenes.iter().position(|name| Some(name) == scene);
+        let facts = at.and_then(|at| self.about.scenes.get(at));
+        if facts.is_some_and(|facts| !facts.lens) { 3 } else { 4 }
+    }
+
     /// The times of a cell.
     pub fn speed(&self, cell: &Cell) -> Option<&Speed> {
         let same = |s: &&Speed| s.scene == cell.scene && s.sampler == cell.sampler && s.spp == cell.spp;
@@ -479,8 +488,9 @@ impl<'a> Index<'a> {
             let missing = summary.samplers.len() - found.len();
             summary.missing.push(format!("{missing} of {} pictures", summary.samplers.len()));
         }
-        if summary.stages.len() < 4 {
-            summary.missing.push(format!("{} of 4 stages of Figure 1", 4 - summary.stages.len()));
+        let (stages, planned) = (summary.stages.len(), summary.stages_planned());
+        if stages < planned {
+            summary.missing.push(format!("{} of {planned} stages of Figure 1", planned - stages));
         }
         let id = found.iter().find_map(|row| row.errors.as_ref()).map(|errors| errors.reference_id.as_str());
         summary.picture_reference = id.and_then(|id| self.references.get(id)).map(|&row| row.clone());

@@ -100,7 +100,7 @@ fn draw(dir: &Path, summary: &Summary) -> Result<Figures> {
     for (i, scene) in summary.scenes.iter().enumerate() {
         pen.chart(&charts::speed_name(&scene.name), charts::speed(summary, i))?;
     }
-    if summary.stages.len() == 4 {
+    if summary.stages.len() == summary.stages_planned() {
         pen.raster("stages", pictured::stages(dir, summary).map_err(|e| e.to_string()))?;
     }
     if !summary.pictures.is_empty() {

@@ -12,13 +12,15 @@ use super::words::row;
 pub fn stages(summary: &Summary, figures: &Figures, page: &mut Page) {
     let Some(pictures) = &summary.about.experiment.pictures else { return };
     page.heading(2, "Figure 1 of the sheet");
-    if summary.stages.len() < 4 {
-        page.paragraph("Not all of the four stages were rendered yet.");
+    let planned = summary.stages_planned();
+    if summary.stages.len() < planned {
+        page.paragraph("Not all of the stages were rendered yet.");
         return;
     }
+    let (number, lens) = if planned == 4 { ("four", "a sampled lens, ") } else { ("three", "") };
     let rows: Vec<String> = summary.stages.iter().map(|stage| row(&stage.id)).collect();
     let caption = format!(
-        "`{}` in four stages, each with one decision more than the one before: pixel centres and albedo, a sampled pixel, a sampled lens, a sampled area light. \
+        "`{}` in {number} stages, each with one decision more than the one before: pixel centres and albedo, a sampled pixel, {lens}a sampled area light. \
          {}, exposure {EXPOSURE}, rows {}.",
         pictures.scene,
         pictures.size,
