@@ -69,7 +69,7 @@ pub fn did_you_mean<'a>(found: &str, candidates: impl IntoIterator<Item = &'a st
     candidates
         .into_iter()
         .map(|c| (edit_distance(found, c), c))
-        .filter(|&(d, c)| d <= 1 + c.len().max(found.len()) / 3)
+        .filter(|&(d, c)| d <= 1 + c.len().min(found.len()) / 3)
         .min_by_key(|&(d, _)| d)
         .map(|(_, c)| c)
 }

@@ -1,7 +1,7 @@
 //! Linear radiance images: EXR with provenance, PNG with exposure, and outputs that are whole or absent.
 
 use std::io::{Cursor, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use exr::prelude::*;
 
@@ -34,15 +34,32 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     write_renamed(path, bytes, true)
 }
 
-/// As [`write_whole`], forcing the bytes to disk before the renaming where `durable`.
-fn write_renamed(path: &Path, bytes: &[u8], durable: bool) -> Result<()> {
+/// Whether a file can be written at `path`, found out by making its folder and an empty temporary file beside it: what
+/// takes long is refused before it starts, not after.
+///
+/// # Errors
+/// Kind [`ErrorKind::Write`](crate::error::ErrorKind::Write) with the system's reason.
+pub fn check_writable(path: &Path) -> Result<()> {
     let fail = |e: std::io::Error| Error::write(path, format!("cannot write: {e}"));
+    let partial = partial_beside(path).map_err(fail)?;
+    std::fs::File::create(&partial).and_then(|_| std::fs::remove_file(&partial)).map_err(fail)?;
+    if path.is_dir() { Err(Error::write(path, "cannot write: it is a folder")) } else { Ok(()) }
+}
+
+/// The temporary name beside `path`, whose folder is made.
+fn partial_beside(path: &Path) -> std::io::Result<PathBuf> {
     if let Some(folder) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
-        std::fs::create_dir_all(folder).map_err(fail)?;
+        std::fs::create_dir_all(folder)?;
     }
     let mut partial = path.as_os_str().to_owned();
     partial.push(format!(".{}.partial", std::process::id()));
-    let partial = Path::new(&partial);
+    Ok(PathBuf::from(partial))
+}
+
+/// As [`write_whole`], forcing the bytes to disk before the renaming where `durable`.
+fn write_renamed(path: &Path, bytes: &[u8], durable: bool) -> Result<()> {
+    let fail = |e: std::io::Error| Error::write(path, format!("cannot write: {e}"));
+    let partial = &partial_beside(path).map_err(fail)?;
     let written = (|| {
         let mut file = std::fs::File::create(partial)?;
         file.write_all(bytes)?;
@@ -196,10 +213,16 @@ pub fn to_screen(image: &Image, exposure: f32) -> Vec<u8> {
 pub fn write_png_rgb8(path: &Path, width: u32, height: u32, bytes: &[u8]) -> Result<()> {
     use image::ImageEncoder;
     use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-    let mut png = Vec::new();
-    PngEncoder::new_with_quality(&mut png, CompressionType::Best, FilterType::Adaptive)
-        .write_image(bytes, width, height, image::ExtendedColorType::Rgb8)
-        .map_err(|e| Error::write(path, format!("cannot encode PNG: {e}")))?;
+    // Pictures compress better with row filters, charts without: the smaller is kept.
+    let encoded = |filter| {
+        let mut png = Vec::new();
+        PngEncoder::new_with_quality(&mut png, CompressionType::Best, filter)
+            .write_image(bytes, width, height, image::ExtendedColorType::Rgb8)
+            .map_err(|e| Error::write(path, format!("cannot encode PNG: {e}")))?;
+        Ok(png)
+    };
+    let (filtered, plain) = (encoded(FilterType::Adaptive)?, encoded(FilterType::NoFilter)?);
+    let png = if plain.len() < filtered.len() { plain } else { filtered };
     write_whole(path, &png)
 }
 

@@ -132,7 +132,9 @@ pub fn read_csv(text: &str, source: &str) -> Result<Points> {
         }
         let fields: Vec<&str> = line.split(',').map(str::trim).collect();
         let numbers: Vec<Option<f64>> = fields.iter().map(|f| f.parse().ok()).collect();
-        let is_header = header_allowed && numbers.iter().all(Option::is_none) && fields.iter().all(|f| !f.is_empty());
+        // Words, none of which begins like a number: a first point that is misspelt is no header.
+        let is_word = |f: &&str| f.chars().next().is_some_and(|c| !c.is_ascii_digit() && !"+-.".contains(c));
+        let is_header = header_allowed && numbers.iter().all(Option::is_none) && fields.iter().all(is_word);
         header_allowed = false;
         let expected = *dimension.get_or_insert(fields.len());
         if fields.len() != expected {
@@ -198,6 +200,8 @@ mod tests {
             ("0.1,\n", "line 1"),
             ("0.1,abc\n", "line 1: expected a number in [0, 1], found \"abc\""),
             ("x,y\na,b\n", "line 2"),
+            ("0.1 0.2\n", "line 1: expected a number in [0, 1], found \"0.1 0.2\""),
+            ("0,1;0,5\n", "line 1: expected a number in [0, 1], found \"1;0\""),
         ] {
             let error = read_csv(text, "a.csv").unwrap_err();
             assert!(error.to_string().contains(needle), "{text:?}: {error}");

@@ -1,7 +1,9 @@
 //! `run` and `report`: experiments.
 
+use std::cell::Cell;
+use std::io::IsTerminal;
 use std::path::PathBuf;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -61,13 +63,12 @@ impl Run {
         options.fresh = self.fresh;
         let bar = Bar::new(self.work.quiet);
         let outcome = execute(&plan, &lab, &out, &bar, &options)?;
-        bar.0.finish_and_clear();
-        let report = report::write(&out)?;
-        self.work.warn(&report.warnings);
+        bar.bar.finish_and_clear();
+        let written = report::write(&out)?;
         if self.json {
             print_json(&json!({
                 "folder": out.display().to_string(),
-                "report": report.path.display().to_string(),
+                "report": written.report.display().to_string(),
                 "items": outcome.items,
                 "found": outcome.found,
                 "done": outcome.done,
@@ -82,7 +83,7 @@ impl Run {
                 outcome.done,
                 outcome.failures.len()
             );
-            eprintln!("report: {}", report.path.display());
+            eprintln!("report: {}", written.report.display());
         }
         outcome.check()
     }
@@ -126,38 +127,39 @@ pub struct Report {
 impl Report {
     /// Rewrites the report.
     pub fn run(self) -> Result<()> {
-        let report = report::write(&self.folder)?;
+        let written = report::write(&self.folder)?;
         if !self.quiet {
-            for warning in &report.warnings {
-                eprintln!("note: {warning}");
-            }
-            eprintln!("report: {}", report.path.display());
+            eprintln!("report: {}", written.report.display());
         }
-        Ok(())
+        written.check()
     }
 }
 
-/// A bar over samples with rate and time left; on a terminal only, else a line now and then.
-struct Bar(ProgressBar);
+/// A bar over samples with rate and time left on a terminal; elsewhere a line every ten seconds.
+struct Bar {
+    bar: ProgressBar,
+    lines: Option<Cell<Instant>>,
+}
 
 impl Bar {
     fn new(quiet: bool) -> Self {
         let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(0) };
         let style = ProgressStyle::with_template("{bar:24} {percent}%  {msg}").expect("the template is well formed");
-        bar.enable_steady_tick(Duration::from_millis(200));
-        Self(bar.with_style(style))
+        let lines = (!quiet && !std::io::stderr().is_terminal()).then(|| Cell::new(Instant::now()));
+        Self { bar: bar.with_style(style), lines }
     }
 
     fn show(&self, label: &str, tick: &Tick) {
-        self.0.set_length(tick.samples.max(1));
-        self.0.set_position(tick.samples_done);
         let eta = tick.eta_seconds.map_or(String::new(), |s| format!(", ETA {s:.0} s"));
-        self.0.set_message(format!(
-            "{}/{} items, {:.2} M samples/s{eta}  {label}",
-            tick.items_done,
-            tick.items,
-            tick.samples_per_second / 1e6
-        ));
+        let rate = tick.samples_per_second / 1e6;
+        let text = format!("{}/{} items, {rate:.2} M samples/s{eta}  {label}", tick.items_done, tick.items);
+        if let Some(last) = self.lines.as_ref().filter(|last| last.get().elapsed() >= Duration::from_secs(10)) {
+            last.set(Instant::now());
+            eprintln!("{text}");
+        }
+        self.bar.set_length(tick.samples.max(1));
+        self.bar.set_position(tick.samples_done);
+        self.bar.set_message(text);
     }
 }
 
@@ -171,6 +173,6 @@ impl Progress for Bar {
     }
 
     fn warn(&self, message: &str) {
-        self.0.suspend(|| eprintln!("note: {message}"));
+        self.bar.suspend(|| eprintln!("note: {message}"));
     }
 }

@@ -7,7 +7,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use sampler_lab::error::{Error, Result};
 use sampler_lab::experiment::backend::Size;
-use sampler_lab::film::{write_exr, write_png};
+use sampler_lab::film::{check_writable, write_exr, write_png};
 use sampler_lab::render::render_observed;
 use sampler_lab::sampling::{MAX_SAMPLES, PointSource, Preset, Sampler, SamplerSpec};
 use sampler_lab::scene::compile::{Scene, Stage};
@@ -101,6 +101,7 @@ impl Render {
             );
             eprintln!("{}: {}", stage.name(), scene.layout);
         }
+        check_writable(&out)?;
         let bar = bar(samples, self.work.quiet);
         let started = Instant::now();
         let rendered = render_observed(&scene, &sampler, &|done| bar.inc(done))

@@ -8,5 +8,11 @@ mod tiles;
 pub use direct::{Contribution, light_contribution};
 pub use tiles::{NonFinite, Rendered, render, render_observed, render_sample};
 
-/// Raised whenever the bits of an image may change.
-pub const ALGORITHM: u32 = 1;
+use crate::accel;
+
+/// Raised whenever this loop, or the camera, lights and textures that it reads, may change the bits of an image.
+const OWN_ALGORITHM: u32 = 1;
+
+/// Changes whenever the bits of an image may: the loop's own number and that of [`accel`]. Both only rise, so the sum changes
+/// whenever one does.
+pub const ALGORITHM: u32 = OWN_ALGORITHM + accel::ALGORITHM - 1;

@@ -1,12 +1,29 @@
-//! Reports: figures, tables and sentences out of rows.
+//! Reports: figures, tables and sentences out of rows. Nothing here renders.
+//!
+//! [`write()`] is the whole of it: rows → [`summarise()`] → figures, tables, `report.md`.
 pub mod bias_variance;
+pub mod evidence;
 pub mod figure;
 pub mod frame;
+pub mod markdown;
+pub mod numbers;
+pub mod pairing;
 pub mod pareto;
 pub mod pictures;
 pub mod plots;
+pub mod provenance;
 pub mod style;
+pub mod summarise;
+pub mod tables;
 
 mod axis;
+mod charts;
 mod labels;
 mod legend;
+mod pictured;
+mod sections;
+mod write;
+
+pub use sections::report as text;
+pub use summarise::{Summary, summarise};
+pub use write::{FigureState, Figures, Written, write};

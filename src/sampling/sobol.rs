@@ -1,6 +1,7 @@
 //! Sobol' sequences, the (0,2)-sequence among them, and their scrambles: digital shift and nested uniform (Owen).
 
-/// Direction numbers of Joe & Kuo (2008), doi:10.1137/070709359, criterion D(6), dimensions 2 to 256, with their notice.
+/// Direction numbers of Joe & Kuo (2008), doi:10.1137/070709359, criterion D(6), dimensions 2 to 256, under their notice:
+/// lines that begin with `#`.
 const JOE_KUO: &str = include_str!("new-joe-kuo-6.256.txt");
 
 /// One coordinate of the Sobol' sequence, ready to look up: x = T₀[i₀] ⊕ T₁[i₁] ⊕ T₂[i₂] for the bytes of a 24-bit index.
@@ -98,6 +99,18 @@ mod tests {
         let first: Vec<u32> = (0..8).map(|i| y.fraction(i) >> 29).collect();
         assert_eq!(first, [0, 4, 6, 2, 5, 1, 3, 7]);
         assert!(SobolAxis::new(255).is_some() && SobolAxis::new(256).is_none());
+    }
+
+    #[test]
+    fn the_table_keeps_its_notice_and_all_its_rows() {
+        let notice: Vec<&str> = JOE_KUO.lines().take_while(|line| line.starts_with('#')).collect();
+        for words in
+            ["Copyright (c) 2008, Frances Y. Kuo and Stephen Joe", "list of conditions and the following disclaimer"]
+        {
+            assert!(notice.iter().any(|line| line.contains(words)), "{words}");
+        }
+        let first_words = JOE_KUO.lines().skip(notice.len() + 1).map(|line| line.split_whitespace().next().unwrap());
+        assert!(first_words.eq((2..=256).map(|d: u32| d.to_string()).collect::<Vec<_>>()));
     }
 
     #[test]

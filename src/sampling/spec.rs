@@ -271,7 +271,7 @@ impl SamplerSpec {
         self.random != Random::None || self.order == Order::Shuffle
     }
 
-    /// Whether a single number, over all seeds, is uniform on [0, 1): then an image is unbiased sample by sample.
+    /// Whether a single number of a 2-D decision, over all seeds, is uniform on [0, 1): then an image is unbiased sample by sample.
     pub fn is_uniform_marginally(&self) -> bool {
         match self.random {
             Random::None | Random::Yxor => false,

@@ -145,9 +145,9 @@ pub enum LightSet {
     Many {
         /// Lights of positive power.
         lights: Vec<Light>,
-        /// Probability of each.
+        /// Probability of each: power over all power, to a whole multiple of 2⁻²⁴ that is never 0.
         pmf: Vec<f32>,
-        /// Cumulative probability up to and including each.
+        /// Cumulative probability up to and including each; ends in 1.
         cumulative: Vec<f64>,
         /// Which light.
         pick: Dim1,
@@ -178,21 +178,16 @@ impl LightSet {
             0 => Self::Dark,
             1 => Self::One { light: lights.remove(0), point: layout.claim_2d(Decision::LightPoint) },
             _ => {
-                // Scaled by the largest first: the sum of finite powers may overflow otherwise.
-                let largest = lights.iter().map(|l| l.power).fold(0.0, f64::max);
-                let total: f64 = lights.iter().map(|l| l.power / largest).sum();
-                let share = |l: &Light| l.power / largest / total;
-                let mut sum = 0.0;
-                let mut cumulative: Vec<f64> = lights
+                let steps = pick_steps(&lights.iter().map(|l| l.power).collect::<Vec<_>>());
+                let mut sum = 0;
+                let cumulative = steps
                     .iter()
-                    .map(|l| {
-                        sum += share(l);
-                        sum
+                    .map(|&s| {
+                        sum += s;
+                        f64::from(sum) / f64::from(PICK_STEPS)
                     })
                     .collect();
-                // Rounding must not leave a gap at the end: the last light takes it.
-                *cumulative.last_mut().expect("there are lights") = 1.0;
-                let pmf = lights.iter().map(|l| share(l) as f32).collect();
+                let pmf = steps.iter().map(|&s| s as f32 / PICK_STEPS as f32).collect();
                 let pick = layout.claim_1d(Decision::LightPick);
                 Self::Many { lights, pmf, cumulative, pick, point: layout.claim_2d(Decision::LightPoint) }
             }
@@ -207,6 +202,27 @@ impl LightSet {
             Self::Many { lights, .. } => lights,
         }
     }
+}
+
+/// The numbers that pick a light are multiples of 2⁻²⁴.
+const PICK_STEPS: u32 = 1 << 24;
+
+/// How many of the 2²⁴ numbers pick each of up to 2²⁴ lights of these powers, all above 0: the sum is 2²⁴.
+///
+/// A probability that is no multiple of 2⁻²⁴ is not the one a light is picked with: of 10⁻³⁰ beside 10³⁰, u = 0 would still
+/// pick the former, 2⁻²⁴ of the time and not 10⁻⁶⁰, and divide by that. So probabilities are counted in steps, every light
+/// has one at least, and the estimator divides by exactly what it was picked with; the strongest takes what rounding leaves.
+fn pick_steps(powers: &[f64]) -> Vec<u32> {
+    // Scaled by the largest first: the sum of finite powers may overflow otherwise.
+    let largest = powers.iter().copied().fold(0.0, f64::max);
+    let total: f64 = powers.iter().map(|p| p / largest).sum();
+    let to_share = PICK_STEPS.saturating_sub(powers.len() as u32);
+    let mut steps: Vec<u32> = powers.iter().map(|p| 1 + (p / largest / total * f64::from(to_share)) as u32).collect();
+    let left = PICK_STEPS.saturating_sub(steps.iter().sum());
+    if let Some(strongest) = (0..powers.len()).max_by(|&a, &b| powers[a].total_cmp(&powers[b])) {
+        steps[strongest] += left;
+    }
+    steps
 }
 
 /// Index of the light that `u` in [0, 1) picks from cumulative probabilities that end in 1.
@@ -270,5 +286,21 @@ mod tests {
         assert_eq!(pick_light(&cumulative, 0.0), 0);
         assert_eq!(pick_light(&cumulative, 0.25), 1);
         assert_eq!(pick_light(&cumulative, 1.0 - f32::EPSILON / 2.0), 2);
+    }
+
+    #[test]
+    fn every_light_is_picked_by_as_many_numbers_as_its_probability_says() {
+        for powers in [vec![1.0, 3.0], vec![1e-30, 1e30], vec![1e300, 1e300, 1e-300], vec![0.1; 7], vec![5.0; 1000]] {
+            let steps = pick_steps(&powers);
+            assert_eq!(steps.iter().sum::<u32>(), PICK_STEPS);
+            let total: f64 = powers.iter().map(|p| p / powers[0]).sum();
+            for (power, &count) in powers.iter().zip(&steps) {
+                let share = power / powers[0] / total * f64::from(PICK_STEPS);
+                // One step at least, rounding down, and what that leaves.
+                let rounding = 2.0 * powers.len() as f64;
+                assert!(count > 0 && (f64::from(count) - share).abs() <= rounding, "{powers:?}: {count}");
+            }
+        }
+        assert_eq!(pick_steps(&[1.0, 3.0]), [PICK_STEPS / 4, PICK_STEPS / 4 * 3]);
     }
 }

@@ -1,0 +1,190 @@
+//! The charts of a report, out of its summary.
+
+use crate::sampling::{Points, Preset, point_set};
+use crate::stats::Estimate;
+
+use super::bias_variance::{self, BiasVariance, Group, bias_variance_chart};
+use super::figure::{Figure, Rgb8};
+use super::frame::Frame;
+use super::numbers::{counted, listed};
+use super::pareto::{Trial, pareto_chart};
+use super::pictures::{NamedPoints, point_set_contact_sheet};
+use super::plots::{Datum, Floor, Guide, Plot, Series, loglog_chart, small_multiples};
+use super::provenance;
+use super::summarise::Summary;
+
+/// The points of the sheet's Figure 2.
+pub const FIGURE_2_POINTS: u32 = 1024;
+
+/// `subtitle`, then what made the figure.
+fn frame(summary: &Summary, title: &str, subtitle: &str, axes: [&str; 2]) -> Frame {
+    Frame {
+        title: title.to_owned(),
+        subtitle: format!("{subtitle} · {}", provenance::line(&summary.about)),
+        x_label: axes[0].to_owned(),
+        y_label: axes[1].to_owned(),
+        x_ticks: Vec::new(),
+    }
+}
+
+fn ends(estimate: &Estimate) -> Option<(f64, f64)> {
+    estimate.ci95.map(|[low, high]| (low, high))
+}
+
+fn replicates(summary: &Summary) -> String {
+    counted(summary.about.experiment.replicates as usize, "replicate", "replicates")
+}
+
+/// The sheet's Figure 2 and below it the same sets as `:best` gives them; what is shown is named.
+pub fn point_sets(summary: &Summary) -> Option<Rgb8> {
+    let families = [Points::Uniform, Points::Stratified, Points::Halton, Points::Hammersley, Points::Ld];
+    let shown = [Preset::Sheet, Preset::Best].iter().flat_map(|preset| families.iter().map(move |f| (*preset, *f)));
+    let sets: Option<Vec<NamedPoints>> = shown
+        .map(|(preset, family)| {
+            let spec = preset.of(family)?;
+            let points = point_set(spec, FIGURE_2_POINTS, summary.about.experiment.seed).ok()?;
+            let suffix = if preset == Preset::Sheet { "sheet" } else { "best" };
+            let points = points.into_iter().map(|[x, y]| (x, y)).collect();
+            Some(NamedPoints { name: format!("{}:{suffix}", family.word()), points })
+        })
+        .collect();
+    sets.map(|sets| point_set_contact_sheet(&sets, families.len()))
+}
+
+/// Star discrepancy against the number of points; `None` without such rows.
+pub fn discrepancy(summary: &Summary) -> Option<Figure> {
+    let series: Vec<Series> = (0..summary.samplers.len())
+        .filter_map(|sampler| {
+            let datum = |set: &super::summarise::PointSet| {
+                let mean = set.mean?;
+                Some(Datum { x: f64::from(set.n.taken), y: mean.value, interval: ends(&mean) })
+            };
+            let sets = summary.point_sets.iter().filter(|set| set.sampler == sampler && set.metric == "star");
+            let points: Vec<Datum> = sets.filter_map(datum).collect();
+            (!points.is_empty()).then(|| Series::of_sampler(&summary.samplers[sampler].label, points))
+        })
+        .collect();
+    if series.is_empty() {
+        return None;
+    }
+    let replicates = summary.about.experiment.points.as_ref().map_or(1, |points| points.replicates as usize);
+    let subtitle =
+        format!("mean of {}, 95 % bands; exact in 2-D", counted(replicates, "independent set", "independent sets"));
+    let axes = ["n (points)", "star discrepancy D* (no unit)"];
+    let guides = vec![guide(-0.5, "slope −1/2"), guide(-1.0, "slope −1")];
+    let plot = Plot { series, guides, ..Plot::default() };
+    Some(loglog_chart(&frame(summary, "How even the points are", &subtitle, axes), &plot))
+}
+
+fn guide(slope: f64, label: &str) -> Guide {
+    Guide { slope, label: label.to_owned() }
+}
+
+/// RMSE against samples per pixel, a panel a scene; where the literal reading was run, it has a row of its own.
+pub fn convergence(summary: &Summary) -> Option<Figure> {
+    let is_literal = |sampler: usize| summary.samplers[sampler].label.ends_with(":sheet");
+    let (literal, other): (Vec<usize>, Vec<usize>) = (0..summary.samplers.len()).partition(|&i| is_literal(i));
+    let with_uniform = |samplers: &[usize]| -> Vec<usize> {
+        summary.uniform().into_iter().filter(|u| !samplers.contains(u)).chain(samplers.iter().copied()).collect()
+    };
+    let rows: Vec<(&str, Vec<usize>)> = match (literal.is_empty(), other.is_empty()) {
+        (true, _) => vec![("", other)],
+        (_, true) => vec![(": read literally", literal)],
+        _ => vec![(": read literally", with_uniform(&literal)), (": decisions kept apart", with_uniform(&other))],
+    };
+    let panels: Vec<Plot> = rows
+        .iter()
+        .flat_map(|(words, samplers)| {
+            (0..summary.scenes.len()).map(move |scene| panel(summary, scene, samplers, words))
+        })
+        .collect();
+    if panels.iter().all(|plot| plot.series.is_empty()) {
+        return None;
+    }
+    let subtitle = format!("{}, 95 % bands; dotted: the reference's own noise", replicates(summary));
+    let axes = ["samples per pixel", "RMSE (radiance, W m⁻² sr⁻¹)"];
+    let frame = frame(summary, "Error against samples per pixel", &subtitle, axes);
+    Some(small_multiples(&frame, &panels, summary.scenes.len().clamp(1, 3)))
+}
+
+fn panel(summary: &Summary, scene: usize, samplers: &[usize], words: &str) -> Plot {
+    let of = |&sampler: &usize| {
+        let datum = |cell: &&super::summarise::Cell| {
+            let rmse = cell.rmse?;
+            Some(Datum { x: f64::from(cell.spp.taken), y: rmse.value, interval: ends(&rmse) })
+        };
+        let points: Vec<Datum> = summary.cells_of(scene, sampler).iter().filter_map(datum).collect();
+        (!points.is_empty()).then(|| Series::of_sampler(&summary.samplers[sampler].label, points))
+    };
+    let scene = &summary.scenes[scene];
+    let floor = scene.reference_rmse().filter(|&rmse| rmse > 0.0);
+    Plot {
+        title: format!("{}{words}", scene.name),
+        series: samplers.iter().filter_map(of).collect(),
+        guides: vec![guide(-0.5, "slope −1/2"), guide(-1.0, "slope −1")],
+        floor: floor.map(|value| Floor { value, label: "reference noise".to_owned() }),
+    }
+}
+
+/// bias² and variance of every sampler at the most samples per pixel, a group a scene.
+pub fn bias_and_variance(summary: &Summary) -> Option<Figure> {
+    let most = summary.most_spp()?;
+    let estimate = |e: Estimate| bias_variance::Estimate { value: e.value, interval: ends(&e) };
+    let groups: Vec<Group> = (0..summary.scenes.len())
+        .map(|scene| {
+            let row = |sampler: usize| {
+                let cell = summary.cell(scene, sampler, most)?;
+                let label = &summary.samplers[sampler].label;
+                Some(BiasVariance::of_sampler(label, estimate(cell.bias2), cell.variance.map(estimate)))
+            };
+            let rows = (0..summary.samplers.len()).filter_map(row).collect();
+            Group { title: summary.scenes[scene].name.clone(), rows }
+        })
+        .filter(|group: &Group| !group.rows.is_empty())
+        .collect();
+    if groups.is_empty() {
+        return None;
+    }
+    let subtitle = format!("{}, 95 % intervals", replicates(summary));
+    let axes = ["squared radiance, mean over pixels and channels", ""];
+    let title = format!("Bias² and variance at {most} spp");
+    Some(bias_variance_chart(&frame(summary, &title, &subtitle, axes), &groups))
+}
+
+/// What the speed chart of a scene is called in `figures/`: letters, digits and `.-_` alone, so that every viewer finds it.
+pub fn speed_name(scene: &str) -> String {
+    let plain = |c: char| if c.is_ascii_alphanumeric() || ".-_".contains(c) { c } else { '-' };
+    format!("speed-{}", scene.chars().map(plain).collect::<String>())
+}
+
+/// Seconds against RMSE of one scene; `None` where nothing was timed.
+pub fn speed(summary: &Summary, scene: usize) -> Option<Figure> {
+    let trials: Vec<Trial> = (0..summary.samplers.len())
+        .flat_map(|sampler| summary.cells_of(scene, sampler))
+        .filter_map(|cell| {
+            let (speed, rmse) = (summary.speed(cell)?, cell.rmse?);
+            let label = &summary.samplers[cell.sampler].label;
+            let detail = format!("{} spp", cell.spp.taken);
+            Some(Trial {
+                seconds_interval: ends(&speed.seconds),
+                error_interval: ends(&rmse),
+                ..Trial::of_sampler(label, &detail, speed.seconds.value, rmse.value)
+            })
+        })
+        .collect();
+    if trials.is_empty() {
+        return None;
+    }
+    let name = &summary.scenes[scene].name;
+    let mut threads: Vec<String> = summary.speeds.iter().map(|speed| speed.threads.to_string()).collect();
+    threads.sort();
+    threads.dedup();
+    let subtitle = format!(
+        "{name}, {} pixels, {}; bars: range of seconds, 95 % interval of RMSE; this machine, {} threads",
+        summary.scenes[scene].size,
+        replicates(summary),
+        listed(&threads)
+    );
+    let axes = ["render time (s, median)", "RMSE (radiance, W m⁻² sr⁻¹)"];
+    Some(pareto_chart(&frame(summary, &format!("Speed against accuracy: {name}"), &subtitle, axes), &trials))
+}

@@ -1,0 +1,257 @@
+//! The answer box: at most eight lines that answer the sheet's questions.
+
+use crate::sampling::{Points, Preset};
+
+use super::super::evidence::{Answer, Limit, below};
+use super::super::markdown::{Page, link_to};
+use super::super::numbers::{listed, signed_estimate};
+use super::super::summarise::{Cell, Summary};
+use super::correlation::patterns;
+use super::identical::bytes;
+use super::points::star_against_uniform;
+use super::titles;
+use super::words::{against_one, bias_short, main_scene, name, rmse_ratio, rows, scene_name, times};
+
+/// Lines of the box.
+const MOST_LINES: usize = 8;
+
+/// The section.
+pub fn section(summary: &Summary, page: &mut Page) {
+    page.heading(2, "Answers");
+    let Some(scene) = main_scene(summary).filter(|_| !summary.cells.is_empty()) else {
+        page.paragraph("There are no comparisons yet to answer from.");
+        return;
+    };
+    let others = [identical(summary, scene), helps(summary, scene), hurts(summary)];
+    let others: Vec<String> = others.into_iter().flatten().collect();
+    let mut lines: Vec<String> = Points::ALL.iter().filter_map(|&points| technique(summary, points)).collect();
+    lines.truncate(MOST_LINES - others.len());
+    lines.extend(others);
+    page.paragraph("*Advantages and disadvantages of each technique; are the outputs identical; are samples independent or correlated, and does it help?*");
+    page.numbered(&lines);
+}
+
+/// Index of the family's cure, or of the only preset there is.
+fn recommended(summary: &Summary, points: Points) -> Option<usize> {
+    let preset = |preset| summary.preset(points, preset);
+    preset(Preset::Best).or_else(|| preset(Preset::Sheet)).or_else(|| preset(Preset::Plain))
+}
+
+/// One technique: what it gains over uniform sampling, and what it costs.
+fn technique(summary: &Summary, points: Points) -> Option<String> {
+    let sampler = recommended(summary, points)?;
+    let title = format!("**{}**", points.word());
+    if Some(sampler) == summary.uniform() {
+        return uniform_line(summary, sampler).map(|line| format!("{title}: {line}"));
+    }
+    let parts: Vec<String> = [gain(summary, sampler), literal(summary, points)].into_iter().flatten().collect();
+    (!parts.is_empty()).then(|| format!("{title}: {}", parts.join(" ")))
+}
+
+/// Uniform sampling: the yardstick.
+fn uniform_line(summary: &Summary, uniform: usize) -> Option<String> {
+    let most = summary.most_spp()?;
+    let cells: Vec<&Cell> = (0..summary.scenes.len()).filter_map(|scene| summary.cell(scene, uniform, most)).collect();
+    let unbiased = (0..summary.scenes.len()).filter_map(|scene| summary.course(scene, uniform));
+    let unbiased = unbiased.filter(|course| course.is_biased() == Answer::No).count();
+    let scene = main_scene(summary)?;
+    let cell = cells.iter().find(|cell| cell.scene == scene)?;
+    let slope = summary.slope(scene, uniform).and_then(|slope| slope.fit.as_ref());
+    let slope = slope.map(|fit| {
+        let slope = crate::stats::Estimate { value: fit.slope, ci95: fit.ci95 };
+        format!(", slope {}", signed_estimate(&slope))
+    });
+    let (spp, better, others) = beaten_by(summary, scene, uniform)?;
+    let right = match unbiased {
+        0 => "that there is no bias cannot be claimed in any scene".to_owned(),
+        n => format!("advantage: no bias seen in {n} of {}", super::words::scenes(cells.len())),
+    };
+    let slow = match better {
+        0 => "no other sampler is seen to do better",
+        _ => "disadvantage: slow",
+    };
+    Some(format!(
+        "{right} (in {}, {}); {slow}{}: at {spp} spp {better} of {others} others have a smaller error. See {}. {}",
+        scene_name(summary, scene),
+        bias_short(cell),
+        slope.unwrap_or_default(),
+        link_to(titles::CONVERGENCE),
+        rows(&[cell])
+    ))
+}
+
+/// How many of the other samplers have a smaller error.
+fn beaten_by(summary: &Summary, scene: usize, uniform: usize) -> Option<(u32, usize, usize)> {
+    let spp = summary.middle_spp()?;
+    let base = summary.cell(scene, uniform, spp)?;
+    let others: Vec<&Cell> =
+        (0..summary.samplers.len()).filter(|&i| i != uniform).filter_map(|i| summary.cell(scene, i, spp)).collect();
+    let better =
+        others.iter().filter(|cell| rmse_ratio(cell, base).is_some_and(|r| below(&r, 1.0) == Answer::Yes)).count();
+    Some((spp, better, others.len()))
+}
+
+/// RMSE against uniform sampling's in every scene.
+fn gain(summary: &Summary, sampler: usize) -> Option<String> {
+    let (uniform, spp) = (summary.uniform()?, summary.middle_spp()?);
+    let mut cells: Vec<&Cell> = Vec::new();
+    let ratios: Vec<(usize, crate::stats::Estimate)> = (0..summary.scenes.len())
+        .filter_map(|scene| {
+            let cell = summary.cell(scene, sampler, spp)?;
+            let ratio = rmse_ratio(cell, summary.cell(scene, uniform, spp)?)?;
+            cells.push(cell);
+            Some((scene, ratio))
+        })
+        .collect();
+    let less = ratios.iter().filter(|(_, ratio)| against_one(ratio) == "less").count();
+    let words = match (less == ratios.len(), less) {
+        (true, _) => "advantage: a smaller error than uniform's in every scene",
+        (_, 0) => "no advantage over uniform is seen",
+        _ => "advantage in some scenes",
+    };
+    let told: Vec<String> =
+        ratios.iter().map(|(scene, ratio)| format!("{} {}", scene_name(summary, *scene), times(ratio))).collect();
+    (!ratios.is_empty()).then(|| {
+        format!(
+            "{words}: {} at {spp} spp has an RMSE, over uniform's, of {}. {}",
+            name(summary, sampler),
+            told.join(", "),
+            rows(&cells)
+        )
+    })
+}
+
+/// The disadvantage of the literal reading.
+fn literal(summary: &Summary, points: Points) -> Option<String> {
+    let sheet = summary.preset(points, Preset::Sheet)?;
+    let (_, to) = summary.course_counts()?;
+    let by = |wanted: Limit| -> Vec<usize> {
+        let has = |&scene: &usize| summary.course(scene, sheet).is_some_and(|course| course.limit() == wanted);
+        (0..summary.scenes.len()).filter(has).collect()
+    };
+    let (wrong, stalls) = (by(Limit::Wrong), by(Limit::Stalls));
+    let told = |scenes: &[usize]| {
+        let items: Vec<String> = scenes
+            .iter()
+            .filter_map(|&scene| {
+                let cell = summary.cell(scene, sheet, to)?;
+                Some(format!("{} ({})", scene_name(summary, scene), bias_short(cell)))
+            })
+            .collect();
+        listed(&items)
+    };
+    let mut parts = Vec::new();
+    if !wrong.is_empty() {
+        parts.push(format!("converges to a wrong image in {}", told(&wrong)));
+    }
+    if !stalls.is_empty() {
+        parts.push(format!("stalls in {}", told(&stalls)));
+    }
+    let (who, link) = (name(summary, sheet), link_to(titles::DECISIONS));
+    Some(match parts.as_slice() {
+        [] => format!("Read literally, {who}, no wrong limit and no stall is seen at {to} spp; see {link}."),
+        parts => format!("Disadvantage: read literally, {who}, it {} at {to} spp; see {link}.", parts.join(" and ")),
+    })
+}
+
+/// Are the outputs identical?
+fn identical(summary: &Summary, scene: usize) -> Option<String> {
+    let most = summary.most_spp()?;
+    let found = bytes(summary, scene, most);
+    if found.images < 2 {
+        return None;
+    }
+    let words = match found.distinct {
+        n if n == found.images => "no, all differ".to_owned(),
+        n => format!("{n} different ones among them"),
+    };
+    let wrong = (0..summary.samplers.len())
+        .filter(|&i| summary.course(scene, i).is_some_and(|course| course.limit() == Limit::Wrong))
+        .count();
+    let why = match wrong {
+        0 => "by their noise; no wrong limit is seen".to_owned(),
+        n => format!("by their noise, and {n} of them by a bias that stays"),
+    };
+    Some(format!(
+        "**Identical?** {} samplers' images of {} at {most} spp: {words} (pixel digests), {why}; see {}.",
+        found.images,
+        scene_name(summary, scene),
+        link_to(titles::IDENTICAL)
+    ))
+}
+
+/// Correlation within a set helps.
+fn helps(summary: &Summary, scene: usize) -> Option<String> {
+    let (uniform, spp) = (summary.uniform()?, summary.middle_spp()?);
+    let base = summary.cell(scene, uniform, spp)?;
+    let best = (0..summary.samplers.len())
+        .filter(|&i| i != uniform)
+        .filter_map(|i| Some((i, rmse_ratio(summary.cell(scene, i, spp)?, base)?)))
+        .min_by(|a, b| a.1.value.total_cmp(&b.1.value))?;
+    let star = star_against_uniform(summary, best.0);
+    let even = star.map(|(ratio, n, id)| {
+        format!("; the discrepancy of its {n} points is {} of uniform's (row {id})", times(&ratio))
+    });
+    let ids = rows(&[summary.cell(scene, best.0, spp)?, base]);
+    let words = match against_one(&best.1) {
+        "less" => "it helps",
+        "more" => "it does not help here",
+        _ => "whether it helps cannot be told",
+    };
+    Some(format!(
+        "**Independent or correlated?** Only uniform's are independent. Within a set, points that keep apart are correlated: {words}. Smallest RMSE over uniform's in {} at \
+         {spp} spp: {} {} {ids}{}; see {}.",
+        scene_name(summary, scene),
+        name(summary, best.0),
+        times(&best.1),
+        even.unwrap_or_default(),
+        link_to(titles::WITHIN)
+    ))
+}
+
+/// Correlation between decisions and between pixels hurts.
+fn hurts(summary: &Summary) -> Option<String> {
+    let worst = (0..summary.scenes.len())
+        .flat_map(|scene| summary.literal_pairs().into_iter().map(move |pair| (scene, pair)))
+        .filter_map(|(scene, (sheet, best))| {
+            let most = summary.most_spp()?;
+            let ratio = rmse_ratio(summary.cell(scene, sheet, most)?, summary.cell(scene, best, most)?)?;
+            Some((scene, sheet, best, ratio))
+        })
+        .max_by(|a, b| a.3.value.total_cmp(&b.3.value));
+    let alike = (0..summary.scenes.len())
+        .flat_map(|scene| patterns(summary, scene).into_iter().map(move |p| (scene, p)))
+        .filter(|(_, p)| p.errs_alike() == Answer::Yes && !p.cell.is_fixed)
+        .filter_map(|(scene, p)| Some((scene, p.cell, p.cell.error_autocorrelation?)))
+        .max_by(|a, b| a.2.value.total_cmp(&b.2.value));
+    let mut parts = Vec::new();
+    if let Some((scene, sheet, best, ratio)) = worst {
+        let most = summary.most_spp()?;
+        let ids = rows(&[summary.cell(scene, sheet, most)?, summary.cell(scene, best, most)?]);
+        let words = match against_one(&ratio) {
+            "more" => "Between decisions it hurts",
+            "less" => "Between decisions it does not hurt here",
+            _ => "Whether it hurts between decisions cannot be told",
+        };
+        parts.push(format!(
+            "{words}: in the worst case, {} at {} spp, the RMSE of {} is {} times that of {} {ids} ({})",
+            scene_name(summary, scene),
+            summary.most_spp()?,
+            name(summary, sheet),
+            times(&ratio),
+            name(summary, best),
+            link_to(titles::DECISIONS)
+        ));
+    }
+    if let Some((scene, cell, rho)) = alike {
+        parts.push(format!(
+            "between pixels it turns noise into structure: {} in {} has ρ = {} {} ({})",
+            name(summary, cell.sampler),
+            scene_name(summary, scene),
+            signed_estimate(&rho),
+            rows(&[cell]),
+            link_to(titles::PIXELS)
+        ));
+    }
+    (!parts.is_empty()).then(|| format!("**Does correlation hurt?** {}.", parts.join("; ")))
+}

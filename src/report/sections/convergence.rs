@@ -1,0 +1,141 @@
+//! Convergence, and what part of the error is bias.
+
+use crate::stats::{Estimate, IntervalKind};
+
+use super::super::evidence::{Answer, above, below};
+use super::super::markdown::Page;
+use super::super::numbers::{counted, estimate, listed, percent, short, signed_estimate};
+use super::super::summarise::{Slope, Summary};
+use super::super::write::Figures;
+use super::words::{estimate_cell, name, replicates, row, scene_name};
+use super::{show, titles};
+
+/// What independent samples have.
+const INDEPENDENT: f64 = -0.5;
+
+/// A slope in a table: a star where its interval is not one of replicates, `–` where there is none.
+fn slope_cell(slope: Option<&Slope>) -> String {
+    let Some(fit) = slope.and_then(|slope| slope.fit.as_ref()) else { return "–".to_owned() };
+    let star = if fit.interval == IntervalKind::Residuals { "*" } else { "" };
+    format!("{}{star}, {}", signed_estimate(&slope_estimate(fit)), counted(fit.points, "point", "points"))
+}
+
+fn slope_estimate(fit: &crate::stats::SlopeFit) -> Estimate {
+    Estimate { value: fit.slope, ci95: fit.ci95 }
+}
+
+/// The section.
+pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
+    page.heading(2, titles::CONVERGENCE);
+    let caption = format!(
+        "RMSE against samples per pixel taken, {} with 95 % bands; thin lines: slopes −1/2 and −1; dotted: the reference's own noise.",
+        counted(summary.about.experiment.replicates as usize, "replicate", "replicates")
+    );
+    show(page, figures, "convergence", true, &caption);
+    let mut head = vec!["slope of RMSE".to_owned()];
+    head.extend((0..summary.scenes.len()).map(|scene| scene_name(summary, scene)));
+    let lines: Vec<Vec<String>> = (0..summary.samplers.len())
+        .map(|sampler| {
+            let cells = (0..summary.scenes.len()).map(|scene| slope_cell(summary.slope(scene, sampler)));
+            std::iter::once(name(summary, sampler)).chain(cells).collect()
+        })
+        .collect();
+    page.table(&head.iter().map(String::as_str).collect::<Vec<_>>(), &lines);
+    let starred =
+        summary.slopes.iter().filter_map(|slope| slope.fit.as_ref()).any(|fit| fit.interval == IntervalKind::Residuals);
+    let star =
+        if starred { "A star: one image at a count, so the interval is from the scatter about the line. " } else { "" };
+    page.paragraph(&format!("{star}A slope ranks no samplers by itself: look at the error at a count, too."));
+    let items: Vec<String> = (0..summary.scenes.len()).filter_map(|scene| slope_sentence(summary, scene)).collect();
+    page.bullets(&items);
+    let (lines, head) = rmse_table(summary);
+    page.table(&head.iter().map(String::as_str).collect::<Vec<_>>(), &lines);
+}
+
+/// Which slopes are told apart from −1/2.
+fn slope_sentence(summary: &Summary, scene: usize) -> Option<String> {
+    let mut steeper = Vec::new();
+    let mut flatter = Vec::new();
+    let mut neither = Vec::new();
+    for sampler in 0..summary.samplers.len() {
+        let Some(fit) = summary.slope(scene, sampler).and_then(|slope| slope.fit.as_ref()) else { continue };
+        let slope = slope_estimate(fit);
+        match (below(&slope, INDEPENDENT), above(&slope, INDEPENDENT)) {
+            (Answer::Yes, _) => steeper.push(name(summary, sampler)),
+            (_, Answer::Yes) => flatter.push(name(summary, sampler)),
+            _ => neither.push(name(summary, sampler)),
+        }
+    }
+    let part = |list: &[String], words: &str| {
+        if list.is_empty() { None } else { Some(format!("{words} {}", listed(list))) }
+    };
+    let parts: Vec<String> = [
+        part(&steeper, "steeper than independent samples' −1/2 with the whole interval:"),
+        part(&flatter, "flatter:"),
+        part(&neither, "not told apart from it:"),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    (!parts.is_empty()).then(|| format!("In {}, {}.", scene_name(summary, scene), parts.join("; ")))
+}
+
+/// RMSE at every count, one line a scene and sampler.
+fn rmse_table(summary: &Summary) -> (Vec<Vec<String>>, Vec<String>) {
+    let spp = &summary.about.experiment.spp;
+    let mut head = vec!["RMSE".to_owned(), "sampler".to_owned()];
+    head.extend(spp.iter().map(|n| format!("{n} spp")));
+    let lines = (0..summary.scenes.len())
+        .flat_map(|scene| (0..summary.samplers.len()).map(move |sampler| (scene, sampler)))
+        .map(|(scene, sampler)| {
+            let cells = spp.iter().map(|&n| {
+                let cell = summary.cell(scene, sampler, n);
+                cell.map_or("missing".to_owned(), |cell| match cell.rmse {
+                    Some(rmse) => short(rmse.value),
+                    None => "below noise".to_owned(),
+                })
+            });
+            [scene_name(summary, scene), name(summary, sampler)].into_iter().chain(cells).collect()
+        })
+        .collect();
+    (lines, head)
+}
+
+/// bias² and variance.
+pub fn bias_and_variance(summary: &Summary, figures: &Figures, page: &mut Page) {
+    page.heading(2, titles::BIAS);
+    let Some(most) = summary.most_spp() else { return };
+    let caption = format!(
+        "Bias² and variance at {most} spp with 95 % intervals; what reaches the left edge is not told apart from 0. More samples cure variance that falls; \
+         nothing but another sampler cures bias."
+    );
+    show(page, figures, "bias-and-variance", true, &caption);
+    let lines: Vec<Vec<String>> = (0..summary.scenes.len())
+        .flat_map(|scene| (0..summary.samplers.len()).map(move |sampler| (scene, sampler)))
+        .filter_map(|(scene, sampler)| {
+            let cell = summary.cell(scene, sampler, most)?;
+            let variance = if cell.is_fixed { "none: nothing random".to_owned() } else { estimate_cell(cell.variance) };
+            Some(vec![
+                scene_name(summary, scene),
+                name(summary, sampler),
+                estimate(&cell.bias2),
+                variance,
+                estimate(&cell.mse),
+                cell.bias_share().map_or("–".to_owned(), |share| percent(share.clamp(0.0, 1.0))),
+                replicates(cell),
+                row(&cell.id),
+            ])
+        })
+        .collect();
+    page.table(&["scene", "sampler", "bias²", "variance", "MSE", "bias² / MSE", "replicates", "row"], &lines);
+    let fixed: Vec<String> = (0..summary.samplers.len())
+        .filter(|&i| summary.cells.iter().any(|cell| cell.sampler == i && cell.is_fixed))
+        .map(|i| name(summary, i))
+        .collect();
+    if !fixed.is_empty() {
+        page.paragraph(&format!(
+            "With nothing random in {}, there is one image: all of its error is bias, and its interval holds the reference's noise alone.",
+            listed(&fixed)
+        ));
+    }
+}

@@ -1,0 +1,300 @@
+//! Where methods fail, what each is good for, and what the measurement itself cannot see.
+
+use crate::stats::Estimate;
+
+use super::super::evidence::{Answer, Limit, below, clearly_above_one, interpolated, ratio_of_roots};
+use super::super::markdown::{Page, link_to};
+use super::super::numbers::{counted, estimate, listed, percent, short, signed_estimate};
+use super::super::summarise::{Cell, Summary};
+use super::correlation::{pattern_spp, patterns};
+use super::speed::efficiency;
+use super::titles;
+use super::words::{bias_words, limit_words, name, ratio_cell, rmse_ratio, row, rows, scene_name, times};
+
+/// An error at a count that is no power of two, over what its neighbours promise.
+pub struct OddCount {
+    /// Asked for.
+    pub asked: u32,
+    /// Taken.
+    pub taken: u32,
+    /// RMSE over the interpolated one.
+    pub ratio: Estimate,
+}
+
+/// The first count of the experiment that is no power of two but lies between two that are.
+pub fn odd_count(summary: &Summary, scene: usize, sampler: usize) -> Option<OddCount> {
+    let cells = summary.cells_of(scene, sampler);
+    let odd = cells.iter().find(|cell| !cell.spp.asked.is_power_of_two())?;
+    let even: Vec<(f64, Estimate)> = cells
+        .iter()
+        .filter(|cell| cell.spp.taken.is_power_of_two())
+        .map(|cell| (f64::from(cell.spp.taken), cell.mse))
+        .collect();
+    let promised = interpolated(&even, f64::from(odd.spp.taken))?;
+    Some(OddCount { asked: odd.spp.asked, taken: odd.spp.taken, ratio: ratio_of_roots(&odd.mse, &promised)? })
+}
+
+/// The section: every item is a failure that the rows show.
+pub fn section(summary: &Summary, page: &mut Page) {
+    page.heading(2, titles::FAILURES);
+    let mut items = Vec::new();
+    for scene in 0..summary.scenes.len() {
+        for sampler in 0..summary.samplers.len() {
+            items.extend(course_failure(summary, scene, sampler));
+        }
+    }
+    for scene in 0..summary.scenes.len() {
+        for pattern in patterns(summary, scene).iter().filter(|pattern| pattern.errs_alike() == Answer::Yes) {
+            items.push(format!(
+                "{} in {}: structure instead of noise, see {}. {}",
+                name(summary, pattern.sampler),
+                scene_name(summary, scene),
+                link_to(titles::PIXELS),
+                rows(&[pattern.cell])
+            ));
+        }
+    }
+    for scene in 0..summary.scenes.len() {
+        for sampler in 0..summary.samplers.len() {
+            items.extend(odd_failure(summary, scene, sampler));
+        }
+    }
+    if items.is_empty() {
+        page.paragraph("No failure is seen in these rows: no error stays, no bias is seen, no neighbours err alike, no odd count costs accuracy.");
+    }
+    page.bullets(&items);
+    stability(summary, page);
+}
+
+/// A wrong limit, a stall, or a bias beside a falling error.
+fn course_failure(summary: &Summary, scene: usize, sampler: usize) -> Option<String> {
+    let (from, to) = summary.course_counts()?;
+    let (course, cell) = (summary.course(scene, sampler)?, summary.cell(scene, sampler, to)?);
+    let is_failure = match course.limit() {
+        Limit::Wrong | Limit::Stalls => true,
+        // What has nothing random in it is all bias, and says so elsewhere.
+        Limit::Falls => course.is_biased() == Answer::Yes && !cell.is_fixed,
+        Limit::Unclear => false,
+    };
+    let mean = summary.scenes[scene].reference.as_ref().map(|r| r.mean);
+    is_failure.then(|| {
+        format!(
+            "{} in {}: {} (RMSE {to} / {from} spp = {}; {}). {}",
+            name(summary, sampler),
+            scene_name(summary, scene),
+            limit_words(&course),
+            times(&course.rmse_ratio),
+            bias_words(cell, mean),
+            rows(&[cell])
+        )
+    })
+}
+
+fn odd_failure(summary: &Summary, scene: usize, sampler: usize) -> Option<String> {
+    let odd = odd_count(summary, scene, sampler).filter(|odd| clearly_above_one(&odd.ratio))?;
+    let cell = summary.cell(scene, sampler, odd.asked)?;
+    Some(format!(
+        "{} in {} at {} spp ({} taken): its RMSE is {} times what the powers of two around it promise. {}",
+        name(summary, sampler),
+        scene_name(summary, scene),
+        odd.asked,
+        odd.taken,
+        times(&odd.ratio),
+        rows(&[cell])
+    ))
+}
+
+/// How far replicates are apart.
+fn stability(summary: &Summary, page: &mut Page) {
+    let Some(spp) = summary.middle_spp() else { return };
+    let spread = |cell: &Cell| -> Option<f64> {
+        let (low, high) = cell.replicate_mse.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), &m| (l.min(m), h.max(m)));
+        (cell.replicate_mse.len() > 1 && low > 0.0).then(|| (high / low).sqrt())
+    };
+    let lines: Vec<Vec<String>> = (0..summary.samplers.len())
+        .map(|sampler| {
+            let cells = (0..summary.scenes.len()).map(|scene| match summary.cell(scene, sampler, spp) {
+                None => "missing".to_owned(),
+                Some(cell) if cell.is_fixed => "nothing random".to_owned(),
+                Some(cell) => spread(cell).map_or("–".to_owned(), |s| format!("{s:.2}")),
+            });
+            std::iter::once(name(summary, sampler)).chain(cells).collect()
+        })
+        .collect();
+    let mut head = vec![format!("largest / smallest RMSE of the replicates, {spp} spp")];
+    head.extend((0..summary.scenes.len()).map(|scene| scene_name(summary, scene)));
+    page.paragraph("How stable each is from one randomisation to the next:");
+    page.table(&head.iter().map(String::as_str).collect::<Vec<_>>(), &lines);
+}
+
+/// The table of advantages and disadvantages: every cell a measured predicate.
+pub fn table(summary: &Summary, page: &mut Page) {
+    page.heading(2, titles::TABLE);
+    page.paragraph("Every cell is computed from rows; none is an opinion. \"yes\" below: the error falls and no bias is seen, within the interval given.");
+    let scenes: Vec<String> = (0..summary.scenes.len()).map(|scene| scene_name(summary, scene)).collect();
+    let per_scene = |title: String, cell: &dyn Fn(usize, usize) -> String, page: &mut Page| {
+        let mut head = vec![title];
+        head.extend(scenes.iter().cloned());
+        let lines: Vec<Vec<String>> = (0..summary.samplers.len())
+            .map(|sampler| {
+                let cells = (0..summary.scenes.len()).map(|scene| cell(scene, sampler));
+                std::iter::once(name(summary, sampler)).chain(cells).collect()
+            })
+            .collect();
+        page.table(&head.iter().map(String::as_str).collect::<Vec<_>>(), &lines);
+    };
+    if let Some((_, to)) = summary.course_counts() {
+        let title = format!("converges to the right image? (bias² at {to} spp)");
+        per_scene(title, &|scene, sampler| right_image(summary, scene, sampler, to), page);
+    }
+    if let (Some(uniform), Some(spp)) = (summary.uniform(), summary.middle_spp()) {
+        let title = format!("RMSE at {spp} spp / uniform's");
+        per_scene(title, &|scene, sampler| against_uniform(summary, scene, sampler, uniform, spp), page);
+    }
+    others(summary, page);
+}
+
+fn right_image(summary: &Summary, scene: usize, sampler: usize, to: u32) -> String {
+    let (Some(course), Some(cell)) = (summary.course(scene, sampler), summary.cell(scene, sampler, to)) else {
+        return "cannot tell".to_owned();
+    };
+    let word = match (course.limit(), course.is_biased()) {
+        (Limit::Wrong, _) => "no",
+        (Limit::Stalls, _) => "no bias seen, but it stalls",
+        (Limit::Falls, Answer::No) => "yes",
+        (Limit::Falls, Answer::Yes) if cell.is_fixed => "its error falls (all of it bias)",
+        (Limit::Falls, Answer::Yes) => "its error falls, but it is biased",
+        _ => "cannot tell",
+    };
+    format!("{word} ({})", estimate(&cell.bias2))
+}
+
+fn against_uniform(summary: &Summary, scene: usize, sampler: usize, uniform: usize, spp: u32) -> String {
+    if sampler == uniform {
+        return "1".to_owned();
+    }
+    let cells = summary.cell(scene, sampler, spp).zip(summary.cell(scene, uniform, spp));
+    ratio_cell(cells.and_then(|(own, base)| rmse_ratio(own, base)))
+}
+
+/// What is one number a sampler: odd counts, randomness, neighbours, efficiency.
+fn others(summary: &Summary, page: &mut Page) {
+    let Some(scene) = super::words::main_scene(summary) else { return };
+    let at = scene_name(summary, scene);
+    let odd_asked = (0..summary.samplers.len()).find_map(|i| odd_count(summary, scene, i)).map(|odd| odd.asked);
+    let pattern = pattern_spp(summary);
+    let lines: Vec<Vec<String>> = (0..summary.samplers.len())
+        .map(|sampler| {
+            let odd = odd_count(summary, scene, sampler);
+            let works = odd.as_ref().map_or("–".to_owned(), |odd| {
+                let word = match (clearly_above_one(&odd.ratio), below(&odd.ratio, 1.0)) {
+                    (true, _) => "worse than promised",
+                    (_, Answer::Yes) => "better than promised",
+                    _ => "as promised, or cannot tell",
+                };
+                format!("{word}: {} ({} taken)", times(&odd.ratio), odd.taken)
+            });
+            let spec = summary.samplers[sampler].spec;
+            let random = spec.map_or("unknown", |spec| if spec.is_random() { "yes" } else { "no" });
+            let rho =
+                pattern.and_then(|spp| summary.cell(scene, sampler, spp)).and_then(|cell| cell.error_autocorrelation);
+            vec![
+                name(summary, sampler),
+                works,
+                random.to_owned(),
+                rho.map_or("–".to_owned(), |rho| signed_estimate(&rho)),
+                relative_efficiency(summary, scene, sampler).map_or("–".to_owned(), |e| times(&e)),
+            ]
+        })
+        .collect();
+    let head = [
+        format!("in {at}"),
+        format!(
+            "RMSE at {} spp / that promised by its neighbours",
+            odd_asked.map_or("an odd count of".to_owned(), |n| n.to_string())
+        ),
+        "replicates differ".to_owned(),
+        format!("ρ of neighbours, {} spp", pattern.unwrap_or(0)),
+        "1/(MSE · T), relative to uniform (this machine)".to_owned(),
+    ];
+    page.table(&head.iter().map(String::as_str).collect::<Vec<_>>(), &lines);
+}
+
+/// Efficiency at the middle count, over uniform sampling's.
+fn relative_efficiency(summary: &Summary, scene: usize, sampler: usize) -> Option<Estimate> {
+    let of = |sampler: usize| {
+        let cell = summary.cell(scene, sampler, summary.middle_spp()?)?;
+        efficiency(cell, summary.speed(cell)?)
+    };
+    let uniform = summary.uniform().filter(|&uniform| uniform != sampler)?;
+    super::super::evidence::ratio(&of(sampler)?, &of(uniform)?)
+}
+
+/// What the measurement cannot see.
+pub fn limits(summary: &Summary, page: &mut Page) {
+    page.heading(2, titles::LIMITS);
+    let e = &summary.about.experiment;
+    let mut items = Vec::new();
+    for (i, scene) in summary.scenes.iter().enumerate() {
+        items.extend(reference_limit(summary, i, scene.reference_rmse()));
+    }
+    items.push(match e.replicates {
+        1 => "One replicate: no variance, and no interval that holds a sampler's own randomness.".to_owned(),
+        n => format!(
+            "{n} replicates: an interval's own width is good to about {} (relative standard error of a variance √(2/(R − 1)), halved for a width); \
+             with so many intervals in this report some miss their truth by chance, one in twenty by design. The verdicts on bias and on odd counts ask for twice the distance for that reason.",
+            percent((2.0 / (f64::from(n) - 1.0)).sqrt() / 2.0)
+        ),
+    });
+    items.push(
+        "Intervals of slopes resample replicates; the reference's noise, common to all counts, is not in them."
+            .to_owned(),
+    );
+    if !summary.speeds.is_empty() {
+        items.push(
+            "Seconds are medians of few images on a machine that may have had other work; efficiencies move with them from run to run, errors do not.".to_owned(),
+        );
+    }
+    if !summary.pictures.is_empty() {
+        items.push(format!(
+            "{} shown once each; a single picture is an example, not a measurement.",
+            if summary.pictures.len() == 1 {
+                "The picture is".to_owned()
+            } else {
+                format!("{} pictures are", summary.pictures.len())
+            }
+        ));
+    }
+    items.push(format!(
+        "{} at small sizes: other scenes, sizes and lenses may rank the samplers otherwise.",
+        counted(summary.scenes.len(), "scene", "scenes")
+    ));
+    page.bullets(&items);
+}
+
+/// How near the errors come to the reference's own.
+fn reference_limit(summary: &Summary, scene: usize, noise: Option<f64>) -> Option<String> {
+    let noise = noise?;
+    let at = scene_name(summary, scene);
+    if noise == 0.0 {
+        return Some(format!("{at}: the reference is exact."));
+    }
+    let cells = summary.cells.iter().filter(|cell| cell.scene == scene);
+    let least = cells.filter_map(|cell| cell.rmse.map(|rmse| (rmse.value, cell))).min_by(|a, b| a.0.total_cmp(&b.0));
+    let below: Vec<String> = summary
+        .cells
+        .iter()
+        .filter(|cell| cell.scene == scene && cell.rmse.is_none())
+        .map(|cell| format!("{} at {} spp", name(summary, cell.sampler), cell.spp.asked))
+        .collect();
+    let least = least.map(|(rmse, cell)| {
+        format!(
+            "; the smallest RMSE measured is {} ({} times it, row {})",
+            short(rmse),
+            short(rmse / noise),
+            row(&cell.id)
+        )
+    });
+    let below = if below.is_empty() { String::new() } else { format!("; below noise: {}", listed(&below)) };
+    Some(format!("{at}: the reference's own RMSE is {}{}{below}.", short(noise), least.unwrap_or_default()))
+}

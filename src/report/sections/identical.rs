@@ -1,0 +1,197 @@
+//! Are the outputs identical? Bytes, means, patterns.
+
+use std::collections::BTreeMap;
+
+use crate::stats::Estimate;
+use crate::stats::hypothesis::{holm, welch};
+
+use super::super::evidence::Limit;
+use super::super::markdown::{Page, link_to};
+use super::super::numbers::{counted, listed, signed_estimate};
+use super::super::summarise::{Cell, Summary};
+use super::titles;
+use super::words::{main_scene, name, row, scene_name};
+
+/// Means count as equal in practice within this share of the mean radiance.
+pub const EQUIVALENT: f64 = 0.01;
+
+/// Images of a scene that are bit for bit the same, by their digests.
+pub struct Bytes {
+    /// Samplers whose image is there.
+    pub images: usize,
+    /// How many different ones.
+    pub distinct: usize,
+    /// Samplers that share one, by index.
+    pub same: Vec<Vec<usize>>,
+}
+
+/// Compares digests of first replicates at one count.
+pub fn bytes(summary: &Summary, scene: usize, spp: u32) -> Bytes {
+    let mut by_digest: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+    for sampler in 0..summary.samplers.len() {
+        if let Some(digest) = summary.cell(scene, sampler, spp).and_then(|cell| cell.pixels.first()) {
+            by_digest.entry(digest).or_default().push(sampler);
+        }
+    }
+    let images = by_digest.values().map(Vec::len).sum();
+    let same = by_digest.values().filter(|samplers| samplers.len() > 1).cloned().collect();
+    Bytes { images, distinct: by_digest.len(), same }
+}
+
+/// The words for it.
+pub fn bytes_words(summary: &Summary, scene: usize, spp: u32) -> String {
+    let Bytes { images, distinct, same } = bytes(summary, scene, spp);
+    let at = scene_name(summary, scene);
+    if images < 2 {
+        return format!("Fewer than two images of {at} at {spp} spp are there to compare.");
+    }
+    if same.is_empty() {
+        return format!(
+            "No two of the {images} samplers' images of {at} at {spp} spp are the same: {distinct} different digests of their pixels."
+        );
+    }
+    let groups: Vec<String> =
+        same.iter().map(|group| listed(&group.iter().map(|&i| name(summary, i)).collect::<Vec<_>>())).collect();
+    format!(
+        "The {images} samplers' images of {at} at {spp} spp have {distinct} different digests; bit for bit the same: {}.",
+        groups.join("; ")
+    )
+}
+
+/// A bias in shares of the scene's mean radiance.
+pub fn relative_bias(summary: &Summary, cell: &Cell) -> Option<Estimate> {
+    let mean =
+        summary.scenes[cell.scene].reference.as_ref().map(|reference| reference.mean).filter(|mean| *mean > 0.0)?;
+    let share = |x: f64| x / mean;
+    Some(Estimate { value: share(cell.bias.value), ci95: cell.bias.ci95.map(|ends| ends.map(share)) })
+}
+
+/// Whether the mean is within [`EQUIVALENT`] of the reference's: by the whole interval.
+fn equivalent(bias: &Estimate) -> &'static str {
+    match bias.ci95 {
+        Some([low, high]) if low > -EQUIVALENT && high < EQUIVALENT => "yes",
+        Some([low, high]) if low > EQUIVALENT || high < -EQUIVALENT => "no",
+        _ => "cannot tell",
+    }
+}
+
+/// The section.
+pub fn section(summary: &Summary, page: &mut Page) {
+    page.heading(2, titles::IDENTICAL);
+    let (Some(scene), Some(most)) = (main_scene(summary), summary.most_spp()) else { return };
+    let mut sentences = vec![bytes_words(summary, scene, most)];
+    for sampler in summary.samplers.iter().filter(|sampler| sampler.names.len() > 1) {
+        let names: Vec<String> = sampler.names.iter().map(|name| format!("`{name}`")).collect();
+        sentences.push(format!(
+            "{} are one sampler by definition (`{}`), so their images are the same.",
+            listed(&names),
+            sampler.canonical
+        ));
+    }
+    page.sentences(&sentences);
+    page.paragraph(
+        "Different bytes need not mean different pictures: two unbiased samplers differ by noise alone and agree ever better as samples are added. So the \
+         means are compared, too.",
+    );
+    for scene in 0..summary.scenes.len() {
+        means(summary, scene, most, page);
+    }
+    page.paragraph(&format!(
+        "Error of the mean: mean signed error in percent of the reference's mean radiance. \"Within {} %\" asks the whole interval. p: Welch's test of the \
+         replicates' means against uniform sampling's, Holm-adjusted over the samplers of the scene; – where there is one replicate. Pictures of equal mean \
+         may still differ in where they err: {} and {}.",
+        100.0 * EQUIVALENT,
+        link_to(titles::BIAS),
+        link_to(titles::PIXELS)
+    ));
+}
+
+fn means(summary: &Summary, scene: usize, most: u32, page: &mut Page) {
+    let cells: Vec<&Cell> = (0..summary.samplers.len()).filter_map(|i| summary.cell(scene, i, most)).collect();
+    let p_values = p_values(summary, &cells);
+    let percent = |e: Estimate| {
+        let scaled = Estimate { value: 100.0 * e.value, ci95: e.ci95.map(|ends| ends.map(|end| 100.0 * end)) };
+        signed_estimate(&scaled)
+    };
+    let lines: Vec<Vec<String>> = cells
+        .iter()
+        .map(|cell| {
+            let bias = relative_bias(summary, cell);
+            vec![
+                name(summary, cell.sampler),
+                bias.map_or("–".to_owned(), percent),
+                bias.map_or("cannot tell", |bias| equivalent(&bias)).to_owned(),
+                p_values
+                    .get(&cell.sampler)
+                    .map_or("–".to_owned(), |p| if *p < 0.001 { "< 0.001".into() } else { format!("{p:.3}") }),
+                row(&cell.id),
+            ]
+        })
+        .collect();
+    let title = format!("{}, {most} spp", scene_name(summary, scene));
+    page.table(&[&title, "error of the mean (%)", &format!("within {} %", 100.0 * EQUIVALENT), "p", "row"], &lines);
+    page.sentences(&means_sentences(summary, scene, &cells));
+}
+
+/// Which means agree, and whether one hides a wrong image.
+fn means_sentences(summary: &Summary, scene: usize, cells: &[&Cell]) -> [String; 2] {
+    let off: Vec<String> = cells
+        .iter()
+        .filter(|cell| relative_bias(summary, cell).is_some_and(|bias| equivalent(&bias) == "no"))
+        .map(|cell| name(summary, cell.sampler))
+        .collect();
+    let same =
+        cells.iter().filter(|cell| relative_bias(summary, cell).is_some_and(|bias| equivalent(&bias) == "yes")).count();
+    let words = match off.as_slice() {
+        [] if same == cells.len() => format!(
+            "In {} all means agree with the reference's within {} %.",
+            scene_name(summary, scene),
+            100.0 * EQUIVALENT
+        ),
+        [] => format!(
+            "In {} {} with the reference's within {} %; for the others it cannot be told.",
+            scene_name(summary, scene),
+            agree(same),
+            100.0 * EQUIVALENT
+        ),
+        off => format!(
+            "In {} the mean of {} is off by more than {} %.",
+            scene_name(summary, scene),
+            listed(off),
+            100.0 * EQUIVALENT
+        ),
+    };
+    let hidden: Vec<String> = cells
+        .iter()
+        .filter(|cell| relative_bias(summary, cell).is_some_and(|bias| equivalent(&bias) == "yes"))
+        .filter(|cell| summary.course(scene, cell.sampler).is_some_and(|course| course.limit() == Limit::Wrong))
+        .map(|cell| name(summary, cell.sampler))
+        .collect();
+    let hidden = match hidden.as_slice() {
+        [] => String::new(),
+        list => format!(
+            "A right mean is no right image: the images of {} converge to wrong ones all the same.",
+            listed(list)
+        ),
+    };
+    [words, hidden]
+}
+
+fn agree(n: usize) -> String {
+    format!("{} {}", counted(n, "mean", "means"), if n == 1 { "agrees" } else { "agree" })
+}
+
+/// Holm-adjusted p-values against uniform sampling, by sampler.
+fn p_values(summary: &Summary, cells: &[&Cell]) -> BTreeMap<usize, f64> {
+    let uniform = cells.iter().find(|cell| Some(cell.sampler) == summary.uniform());
+    let Some(uniform) = uniform else { return BTreeMap::new() };
+    let (samplers, raw): (Vec<usize>, Vec<f64>) = cells
+        .iter()
+        .filter(|cell| cell.sampler != uniform.sampler)
+        .filter_map(|cell| Some((cell.sampler, welch(&cell.replicate_mean, &uniform.replicate_mean)?.p_two_sided)))
+        .unzip();
+    match holm(&raw) {
+        Ok(adjusted) => samplers.into_iter().zip(adjusted).collect(),
+        Err(_) => BTreeMap::new(),
+    }
+}

@@ -1,0 +1,81 @@
+//! The report's text, section by section, in the order of SPEC §7.
+//!
+//! A sentence that asserts something is made by a function of numbers, with other words for the other outcome and for
+//! "cannot tell": the same functions write true sentences about another experiment.
+
+mod answers;
+mod convergence;
+mod correlation;
+mod failures;
+mod identical;
+mod opening;
+mod pictures;
+mod points;
+mod speed;
+mod words;
+
+use super::markdown::Page;
+use super::summarise::Summary;
+use super::write::{FigureState, Figures};
+
+/// Names of sections that others link to.
+mod titles {
+    pub const WITHIN: &str = "Within a set";
+    pub const DECISIONS: &str = "Between decisions";
+    pub const PIXELS: &str = "Between pixels";
+    pub const IDENTICAL: &str = "Identical";
+    pub const CONVERGENCE: &str = "Convergence";
+    pub const BIAS: &str = "Bias and variance";
+    pub const SPEED: &str = "Speed against accuracy";
+    pub const FAILURES: &str = "Where methods fail";
+    pub const TABLE: &str = "Advantages and disadvantages";
+    pub const LIMITS: &str = "Limits";
+}
+
+/// `report.md`.
+pub fn report(summary: &Summary, figures: &Figures) -> String {
+    let mut page = Page::new();
+    opening::title(summary, &mut page);
+    answers::section(summary, &mut page);
+    opening::what_was_run(summary, &mut page);
+    opening::how_to_read(summary, &mut page);
+    opening::scenes_and_samplers(summary, &mut page);
+    pictures::stages(summary, figures, &mut page);
+    points::figure_2(summary, figures, &mut page);
+    points::discrepancy(summary, figures, &mut page);
+    page.heading(2, "Independent or correlated");
+    points::within(summary, &mut page);
+    correlation::between_decisions(summary, &mut page);
+    correlation::between_pixels(summary, &mut page);
+    identical::section(summary, &mut page);
+    convergence::section(summary, figures, &mut page);
+    convergence::bias_and_variance(summary, figures, &mut page);
+    pictures::strips(summary, figures, &mut page);
+    speed::section(summary, figures, &mut page);
+    failures::section(summary, &mut page);
+    failures::table(summary, &mut page);
+    failures::limits(summary, &mut page);
+    page.finish()
+}
+
+/// Shows a figure with its caption, or says why it is not there.
+fn show(page: &mut Page, figures: &Figures, name: &str, is_chart: bool, caption: &str) {
+    let ending = if is_chart { "svg" } else { "png" };
+    let also = if is_chart { format!(" ([PNG](figures/{name}.png))") } else { String::new() };
+    let image = format!("![{}](figures/{name}.{ending})", caption.replace(['[', ']', '`'], ""));
+    match figures.state(name) {
+        FigureState::Drawn => page.paragraph(&format!("{image}\n\n*{caption}*{also}")),
+        FigureState::Kept => page.paragraph(&format!(
+            "{image}\n\n*{caption}*{also} The images are not in this folder: the picture is that of the run that made them."
+        )),
+        FigureState::Absent(why) => page.paragraph(&format!("*Not shown: {name}. {}*", sentence(&why))),
+    }
+}
+
+/// `why` as a sentence.
+fn sentence(why: &str) -> String {
+    let mut letters = why.chars();
+    let first: String = letters.next().into_iter().flat_map(char::to_uppercase).collect();
+    let text = format!("{first}{}", letters.as_str());
+    if text.ends_with('.') { text } else { format!("{text}.") }
+}

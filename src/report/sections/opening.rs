@@ -1,0 +1,154 @@
+//! What was run, how to read it, scenes and samplers.
+
+use super::super::markdown::{Page, link_to};
+use super::super::numbers::{counted, listed, short};
+use super::super::provenance;
+use super::super::summarise::{SLOPE_COUNTS, Summary};
+use super::titles;
+use super::words::name;
+
+/// Title, provenance, and what is missing.
+pub fn title(summary: &Summary, page: &mut Page) {
+    page.heading(1, &format!("Sampling techniques compared: {}", summary.about.experiment.name));
+    page.paragraph(&format!(
+        "Written by the tool from stored results, no sentence by hand: {}.",
+        provenance::line(&summary.about)
+    ));
+    if !summary.missing.is_empty() {
+        page.paragraph(&format!(
+            "**Incomplete.** Missing: {}. What follows speaks of what is there; the command below makes the rest.",
+            summary.missing.join("; ")
+        ));
+    }
+}
+
+/// What was run, and the one command.
+pub fn what_was_run(summary: &Summary, page: &mut Page) {
+    page.heading(2, "What was run");
+    let e = &summary.about.experiment;
+    let names: Vec<String> = summary.scenes.iter().map(|s| format!("`{}` at {}", s.name, s.size)).collect();
+    let spp: Vec<String> = e.spp.iter().map(u32::to_string).collect();
+    let mut items = vec![
+        format!("{}: {}.", counted(names.len(), "scene", "scenes"), listed(&names)),
+        format!(
+            "{} at {} samples per pixel (spp), {} each (1 where nothing is random), {} estimator of light.",
+            counted(summary.samplers.len(), "sampler", "samplers"),
+            listed(&spp),
+            counted(e.replicates as usize, "replicate", "replicates"),
+            e.estimator.name()
+        ),
+        format!(
+            "References: two independent halves of {} spp by `{}`, which is not compared; a closed form where the scene has one.",
+            e.reference.spp, e.reference.sampler
+        ),
+    ];
+    if let Some(points) = &e.points {
+        let (low, high) = (points.n.iter().min().copied().unwrap_or(0), points.n.iter().max().copied().unwrap_or(0));
+        items.push(format!(
+            "Point sets of {low} to {high} points, {} each, measured by {}.",
+            counted(points.replicates as usize, "set", "sets"),
+            listed(&points.metrics.iter().map(|m| format!("`{m}`")).collect::<Vec<_>>())
+        ));
+    }
+    if let Some(pictures) = &e.pictures {
+        items.push(format!(
+            "Pictures: `{}` at {}, {} spp, compared with two halves of {} spp.",
+            pictures.scene, pictures.size, pictures.spp, pictures.reference_spp
+        ));
+    }
+    if !summary.about.notes.is_empty() {
+        items.push(format!("The plan's notes: {}.", summary.about.notes.join("; ")));
+    }
+    page.bullets(&items);
+    page.paragraph("The one command that makes all of this again:");
+    page.code(&summary.about.command);
+    page.paragraph(
+        "Numbers behind every figure: [summary.csv](summary.csv), [slopes.csv](slopes.csv), [results.jsonl](results.jsonl) \
+         (one line an item; rows are named by the first eight digits of their `id`).",
+    );
+}
+
+/// How to read the numbers.
+pub fn how_to_read(summary: &Summary, page: &mut Page) {
+    page.heading(2, "How to read it");
+    let e = &summary.about.experiment;
+    let (low, high) = (SLOPE_COUNTS.start(), SLOPE_COUNTS.end());
+    page.bullets(&[
+        "`[low, high]` is a 95 % interval over independent replicates (each a whole image under a randomisation of its \
+         own), with the reference's own noise in it. Ratios combine the intervals of both sides (MOVER on logarithms). \
+         An interval that holds both answers is written \"cannot tell\"."
+            .to_owned(),
+        "RMSE: root mean square error over pixels and channels in linear radiance, freed of the reference's noise; so an \
+         estimate may come out below 0, and is not clipped. MSE = bias² + variance: bias² is what all replicates have in \
+         common and no averaging removes, variance what differs between them."
+            .to_owned(),
+        format!(
+            "Slope: of log RMSE against log spp by least squares over powers of two from {low} to {high} that the sampler takes as \
+             asked; the interval resamples replicates. Independent samples have −0.5. A star marks slopes whose interval \
+             comes from the scatter about the line, because nothing is random or there is one replicate."
+        ),
+        format!(
+            "A verdict on where an error goes compares {}: it *falls* if the RMSE's ratio lies below the border half-way (on a \
+             logarithmic scale) between independent samples and no gain, and stays if it lies above; then the image is *wrong* if there is a bias that \
+             stays, too, and it *stalls* if no bias is seen. A bias is called only where 0 is more than twice as far from the estimate as the interval's \
+             end, since among so many intervals some miss 0 by chance.",
+            summary.course_counts().map_or("two counts".to_owned(), |(a, b)| format!("{a} with {b} spp"))
+        ),
+        "`:sheet` is the exercise sheet read literally: every decision (pixel, lens, light) walks through the same set in the same \
+         order. `:best` keeps the decisions apart. Correlation ρ between neighbouring pixels' errors: 0 for independent pixels, 1 where \
+         all err alike."
+            .to_owned(),
+        format!("Seeds of all randomisations are derived from {} and stand in the rows.", e.seed),
+    ]);
+}
+
+/// The tables of scenes and samplers.
+pub fn scenes_and_samplers(summary: &Summary, page: &mut Page) {
+    page.heading(2, "Scenes and samplers");
+    let rows: Vec<Vec<String>> = summary
+        .scenes
+        .iter()
+        .map(|scene| {
+            let reference = scene.reference.as_ref();
+            vec![
+                format!("`{}`", scene.name),
+                scene.layout.clone(),
+                if scene.lens { "yes" } else { "no" }.to_owned(),
+                scene.size.to_string(),
+                reference.map_or("missing".to_owned(), |r| short(r.mean)),
+                match reference {
+                    None => "missing".to_owned(),
+                    Some(r) if r.halves.is_none() => "closed form, none".to_owned(),
+                    Some(r) => short(r.noise_mse.max(0.0).sqrt()),
+                },
+            ]
+        })
+        .collect();
+    let head =
+        ["scene", "decisions and the dimensions they read", "lens", "pixels", "mean radiance", "reference's RMSE"];
+    page.table(&head, &rows);
+    let rows: Vec<Vec<String>> = (0..summary.samplers.len()).map(|i| sampler_row(summary, i)).collect();
+    page.table(&["sampler", "stands for", "what it does", "random", "takes where 26 are asked"], &rows);
+    page.paragraph(&format!("What each is good for: {}.", link_to(titles::TABLE)));
+}
+
+fn sampler_row(summary: &Summary, i: usize) -> Vec<String> {
+    let sampler = &summary.samplers[i];
+    let names = match sampler.names.as_slice() {
+        [one] if *one == sampler.label => name(summary, i),
+        names => {
+            format!("{} ({})", name(summary, i), listed(&names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>()))
+        }
+    };
+    let Some(spec) = &sampler.spec else {
+        return vec![
+            names,
+            format!("`{}`", sampler.canonical),
+            "unknown here".into(),
+            "unknown".into(),
+            "unknown".into(),
+        ];
+    };
+    let random = if spec.is_random() { "yes" } else { "no" };
+    vec![names, spec.expansion(), spec.describe(), random.to_owned(), spec.taken(26).to_string()]
+}

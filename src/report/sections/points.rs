@@ -1,0 +1,177 @@
+//! The point sets themselves: the sheet's Figure 2, discrepancy, and how even each set is.
+
+use crate::stats::{Estimate, SlopeFit, slope_with_interval};
+
+use super::super::charts::FIGURE_2_POINTS;
+use super::super::evidence::{Answer, below, ratio};
+use super::super::markdown::Page;
+use super::super::numbers::{counted, estimate, listed, signed_estimate};
+use super::super::summarise::{PointSet, SLOPE_POINTS, Summary};
+use super::super::write::Figures;
+use super::words::{name, ratio_cell, row};
+use super::{show, titles};
+
+/// The sheet's Figure 2.
+pub fn figure_2(summary: &Summary, figures: &Figures, page: &mut Page) {
+    page.heading(2, "Figure 2 of the sheet");
+    let caption = format!(
+        "{FIGURE_2_POINTS} points of one decision in one pixel, seed {}, drawn from cyan (first) to red (last), origin at the bottom left. Above: the sheet's \
+         samplers, `:sheet`. Below: the same sets as `:best` hands them out; where `:best` shuffles, the places are as even, but their order is \
+         new for each decision, so the colours mix.",
+        summary.about.experiment.seed
+    );
+    show(page, figures, "point-sets", false, &caption);
+}
+
+/// The star discrepancy's sets of one sampler by ascending n.
+fn star_sets(summary: &Summary, sampler: usize) -> Vec<&PointSet> {
+    let mut sets: Vec<&PointSet> =
+        summary.point_sets.iter().filter(|set| set.sampler == sampler && set.metric == "star").collect();
+    sets.sort_by_key(|set| set.n.taken);
+    sets
+}
+
+/// Slope of the root mean square star discrepancy in n, over powers of two from [`SLOPE_POINTS`].
+fn star_slope(summary: &Summary, sampler: usize) -> Option<SlopeFit> {
+    let (mut ns, mut squares) = (Vec::new(), Vec::new());
+    for set in star_sets(summary, sampler) {
+        if set.n.taken == set.n.asked && set.n.taken >= SLOPE_POINTS && set.n.taken.is_power_of_two() {
+            let values: Option<Vec<f64>> = set.values.iter().map(|value| value.map(|v| v * v)).collect();
+            ns.push(f64::from(set.n.taken));
+            squares.push(values?);
+        }
+    }
+    slope_with_interval(&ns, &squares, summary.about.experiment.seed)
+}
+
+/// A slope as an estimate.
+fn slope_estimate(fit: &SlopeFit) -> Estimate {
+    Estimate { value: fit.slope, ci95: fit.ci95 }
+}
+
+/// Discrepancy against n.
+pub fn discrepancy(summary: &Summary, figures: &Figures, page: &mut Page) {
+    page.heading(2, "Discrepancy");
+    if !summary.point_sets.iter().any(|set| set.metric == "star") {
+        page.paragraph("No star discrepancies were measured.");
+        return;
+    }
+    page.paragraph(
+        "Star discrepancy D*: the largest gap between the share of points in a box at the origin and the box's area, exact. \
+         Smaller is more even.",
+    );
+    let caption = "Star discrepancy of the points of one decision against their number, mean over independent sets with 95 % bands.";
+    show(page, figures, "discrepancy", true, caption);
+    let shown: Vec<u32> = {
+        let mut counts: Vec<u32> =
+            summary.about.experiment.points.as_ref().map_or(Vec::new(), |points| points.n.clone());
+        counts.sort_unstable();
+        let largest = counts.last().copied().unwrap_or(0);
+        counts.retain(|&n| n == largest || [16, 64, 256].contains(&n));
+        counts
+    };
+    let mut head: Vec<String> = vec!["sampler".to_owned()];
+    head.extend(shown.iter().map(|n| format!("D*, n = {n}")));
+    head.extend(["slope in n".to_owned(), "points of the fit".to_owned()]);
+    let line = |sampler: usize| {
+        let sets = star_sets(summary, sampler);
+        let mut cells = vec![name(summary, sampler)];
+        cells.extend(shown.iter().map(|n| {
+            let set = sets.iter().find(|set| set.n.asked == *n);
+            set.and_then(|set| set.mean).map_or("–".to_owned(), |mean| estimate(&mean))
+        }));
+        let fit = star_slope(summary, sampler);
+        cells.push(fit.as_ref().map_or("–".to_owned(), |fit| signed_estimate(&slope_estimate(fit))));
+        cells.push(fit.map_or("0".to_owned(), |fit| fit.points.to_string()));
+        cells
+    };
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    page.table(&head, &(0..summary.samplers.len()).map(line).collect::<Vec<_>>());
+    page.paragraph(&format!(
+        "The slope is that of the root mean square over sets, powers of two from {SLOPE_POINTS}; independent points have −0.5."
+    ));
+}
+
+/// How a sampler's D* at the largest n compares with uniform's; the row behind it.
+pub fn star_against_uniform(summary: &Summary, sampler: usize) -> Option<(Estimate, u32, String)> {
+    let uniform = summary.uniform()?;
+    let last = |sampler: usize| star_sets(summary, sampler).last().copied().filter(|set| set.mean.is_some());
+    let (a, b) = (last(sampler)?, last(uniform)?);
+    if a.n.asked != b.n.asked {
+        return None;
+    }
+    Some((ratio(&a.mean?, &b.mean?)?, a.n.asked, row(&a.id)))
+}
+
+/// Evenness within a set: correlation that helps.
+pub fn within(summary: &Summary, page: &mut Page) {
+    page.heading(3, titles::WITHIN);
+    let compared: Vec<(usize, Estimate, u32, String)> = (0..summary.samplers.len())
+        .filter(|&sampler| Some(sampler) != summary.uniform())
+        .filter_map(|sampler| star_against_uniform(summary, sampler).map(|(r, n, id)| (sampler, r, n, id)))
+        .collect();
+    let Some(n) = compared.first().map(|(_, _, n, _)| *n) else {
+        page.paragraph("Nothing can be said of the points within a set: no point sets of uniform sampling and another were measured.");
+        return;
+    };
+    let even: Vec<String> = compared
+        .iter()
+        .filter(|(_, ratio, ..)| below(ratio, 1.0) == Answer::Yes)
+        .map(|(sampler, ..)| name(summary, *sampler))
+        .collect();
+    let not: Vec<String> = compared
+        .iter()
+        .filter(|(_, ratio, ..)| below(ratio, 1.0) != Answer::Yes)
+        .map(|(sampler, ..)| name(summary, *sampler))
+        .collect();
+    let mut sentences = Vec::new();
+    if !even.is_empty() {
+        sentences.push(format!(
+            "At n = {n} the points of {} are more even than independent ones: each keeps away from the others, so they are correlated within \
+             the set.",
+            listed(&even)
+        ));
+    }
+    if !not.is_empty() {
+        sentences.push(format!("For {} the interval does not say so.", listed(&not)));
+    }
+    page.sentences(&sentences);
+    evenness_table(summary, &compared, n, page);
+}
+
+/// Evenness at `n` points, sampler by sampler.
+fn evenness_table(summary: &Summary, compared: &[(usize, Estimate, u32, String)], n: u32, page: &mut Page) {
+    let metric = |sampler: usize, metric: &str| -> Vec<Option<f64>> {
+        let sets = summary.point_sets.iter();
+        let found =
+            sets.filter(|s| s.sampler == sampler && s.metric == metric && s.n.asked == n).max_by_key(|s| s.n.taken);
+        found.map_or(Vec::new(), |set| set.values.clone())
+    };
+    let rows: Vec<Vec<String>> = compared
+        .iter()
+        .map(|(sampler, ratio, _, id)| {
+            vec![
+                name(summary, *sampler),
+                ratio_cell(Some(*ratio)),
+                range(&metric(*sampler, "t_value")),
+                range(&metric(*sampler, "min_toroidal_distance")),
+                id.clone(),
+            ]
+        })
+        .collect();
+    let heads = ["sampler", "D* / uniform's D*", "t-value", "least distance (torus)", "row"];
+    page.table(&heads, &rows);
+    page.paragraph(&format!(
+        "The t-value (0 is best) says how coarse boxes must be to hold equal shares of the points, range over {}; – where n is no power of two.",
+        counted(summary.about.experiment.points.as_ref().map_or(1, |p| p.replicates as usize), "set", "sets")
+    ));
+}
+
+/// The range of values over replicates.
+fn range(values: &[Option<f64>]) -> String {
+    let values: Option<Vec<f64>> = values.iter().copied().collect();
+    let Some(values) = values.filter(|values| !values.is_empty()) else { return "–".to_owned() };
+    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+    let text = |v: f64| if v == v.round() { format!("{v:.0}") } else { super::super::numbers::short(v) };
+    if low == high { text(low) } else { format!("{} to {}", text(low), text(high)) }
+}

@@ -1,0 +1,552 @@
+//! From rows to what a report says of them: one cell for each scene, sampler and count, slopes, point sets, timings.
+//!
+//! Pure: the same rows give the same summary. What the experiment asks for and the rows do not hold is counted in
+//! [`Summary::missing`], never guessed.
+
+use std::collections::HashMap;
+
+use crate::experiment::results::{About, Count, EnsembleRow, ImageRow, Kind, PointsRow, ReferenceRow, Row, Timing};
+use crate::experiment::spec::Experiment;
+use crate::sampling::{Decision, Order, Points, Preset, Random, SamplerSpec, Scope};
+use crate::stats::{Estimate, SlopeFit, slope_with_interval, t_interval};
+
+use super::evidence::{Course, ratio, ratio_of_roots};
+
+/// Counts that a slope of RMSE is fitted over: powers of two from 4 to 256 that the sampler takes as asked (METHODS §5).
+pub const SLOPE_COUNTS: std::ops::RangeInclusive<u32> = 4..=256;
+
+/// Smallest set that a slope of the star discrepancy is fitted over.
+pub const SLOPE_POINTS: u32 = 16;
+
+/// Everything that a report says, as numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Summary {
+    /// What was run.
+    pub about: About,
+    /// Its scenes, in its order.
+    pub scenes: Vec<SceneSummary>,
+    /// Its samplers, each once, in the order in which they first occur.
+    pub samplers: Vec<SamplerSummary>,
+    /// By scene, sampler and count, in the experiment's order.
+    pub cells: Vec<Cell>,
+    /// By scene and sampler.
+    pub slopes: Vec<Slope>,
+    /// By sampler and number of points.
+    pub point_sets: Vec<PointSet>,
+    /// The pictures, in the order of the samplers.
+    pub pictures: Vec<ImageRow>,
+    /// The pictures' reference.
+    pub picture_reference: Option<ReferenceRow>,
+    /// The pictures of the sheet's Figure 1, in its order.
+    pub stages: Vec<ImageRow>,
+    /// Times, where any were taken.
+    pub speeds: Vec<Speed>,
+    /// What is not there, in words.
+    pub missing: Vec<String>,
+}
+
+/// A scene and what its images are compared with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneSummary {
+    /// Its name.
+    pub name: String,
+    /// Its decisions and the dimensions they read, in words.
+    pub layout: String,
+    /// Whether there is a lens to sample.
+    pub lens: bool,
+    /// Whether its reference is a closed form.
+    pub has_closed_form: bool,
+    /// Size of the compared images, `WxH`.
+    pub size: String,
+    /// Their number of pixels.
+    pub pixels: u64,
+    /// Its reference; `None` where that row is missing.
+    pub reference: Option<ReferenceRow>,
+}
+
+impl SceneSummary {
+    /// RMSE of the reference itself, in radiance; 0 for a closed form.
+    pub fn reference_rmse(&self) -> Option<f64> {
+        self.reference.as_ref().map(|reference| reference.noise_mse.max(0.0).sqrt())
+    }
+}
+
+/// A sampler of the experiment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SamplerSummary {
+    /// Full form.
+    pub canonical: String,
+    /// What the experiment calls it.
+    pub names: Vec<String>,
+    /// What figures and tables call it: the one name, or the family where several presets are one sampler.
+    pub label: String,
+    /// What it does; `None` where this version cannot read its text.
+    pub spec: Option<SamplerSpec>,
+}
+
+impl SamplerSummary {
+    /// Whether each pixel sees the same points, or one axis of them, so that neighbours may err alike.
+    pub fn repeats_in_every_pixel(&self) -> bool {
+        let repeats = |spec: &SamplerSpec| {
+            let is_shared = matches!(spec.scope, Scope::Image | Scope::Decision);
+            // Hammersley's x = i/n is untouched by a shift of y; a shuffle of the indices mixes it anew.
+            let has_fixed_axis = spec.random == Random::Yxor && spec.order == Order::Step;
+            !spec.is_random() || is_shared || has_fixed_axis
+        };
+        self.spec.as_ref().is_some_and(repeats)
+    }
+}
+
+/// One scene, sampler and count: what the replicates say together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cell {
+    /// Index of the scene.
+    pub scene: usize,
+    /// Index of the sampler.
+    pub sampler: usize,
+    /// Id of the ensemble's row.
+    pub id: String,
+    /// Samples per pixel.
+    pub spp: Count,
+    /// Number of replicates.
+    pub replicates: u32,
+    /// Whether one replicate is all there is, so that the error has no variance.
+    pub is_fixed: bool,
+    /// Unbiased mean square error.
+    pub mse: Estimate,
+    /// Its root; `None` where the estimate of the square is below 0.
+    pub rmse: Option<Estimate>,
+    /// Relative mean square error.
+    pub rel_mse: Estimate,
+    /// Squared bias.
+    pub bias2: Estimate,
+    /// Variance between replicates.
+    pub variance: Option<Estimate>,
+    /// Mean signed error.
+    pub bias: Estimate,
+    /// Correlation of the error between neighbouring pixels.
+    pub error_autocorrelation: Option<Estimate>,
+    /// Unbiased mean square error of each replicate whose row is there.
+    pub replicate_mse: Vec<f64>,
+    /// Mean radiance of each replicate whose row is there.
+    pub replicate_mean: Vec<f64>,
+    /// Digest of each replicate's pixels.
+    pub pixels: Vec<String>,
+}
+
+impl Cell {
+    /// Share of bias² in the MSE; `None` where the MSE is not above 0.
+    pub fn bias_share(&self) -> Option<f64> {
+        (self.mse.value > 0.0).then(|| self.bias2.value / self.mse.value)
+    }
+}
+
+/// How fast the RMSE of one sampler falls in one scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Slope {
+    /// Index of the scene.
+    pub scene: usize,
+    /// Index of the sampler.
+    pub sampler: usize,
+    /// Counts that were fitted over.
+    pub counts: Vec<u32>,
+    /// The fit; `None` where fewer than two counts have an error above 0.
+    pub fit: Option<SlopeFit>,
+}
+
+/// One metric of a sampler's point sets of one size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointSet {
+    /// Index of the sampler.
+    pub sampler: usize,
+    /// Number of points.
+    pub n: Count,
+    /// Name of the metric.
+    pub metric: String,
+    /// Mean over replicates; `None` where the metric is not defined for all of them.
+    pub mean: Option<Estimate>,
+    /// Value of each replicate.
+    pub values: Vec<Option<f64>>,
+    /// Id of the first replicate's row.
+    pub id: String,
+}
+
+/// Seconds that the images of a cell took.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Speed {
+    /// Index of the scene.
+    pub scene: usize,
+    /// Index of the sampler.
+    pub sampler: usize,
+    /// Samples per pixel.
+    pub spp: Count,
+    /// Median over images, with their range as its interval: for eight images a 99 % one, whatever the distribution.
+    pub seconds: Estimate,
+    /// How many images were timed.
+    pub images: usize,
+    /// Threads that worked, most of all images.
+    pub threads: usize,
+}
+
+impl Summary {
+    /// The cell of a scene, a sampler and a count asked for.
+    pub fn cell(&self, scene: usize, sampler: usize, asked: u32) -> Option<&Cell> {
+        self.cells.iter().find(|c| c.scene == scene && c.sampler == sampler && c.spp.asked == asked)
+    }
+
+    /// The cells of a scene and a sampler by ascending count.
+    pub fn cells_of(&self, scene: usize, sampler: usize) -> Vec<&Cell> {
+        let mut cells: Vec<&Cell> = self.cells.iter().filter(|c| c.scene == scene && c.sampler == sampler).collect();
+        cells.sort_by_key(|cell| cell.spp.taken);
+        cells
+    }
+
+    /// The slope of a scene and a sampler.
+    pub fn slope(&self, scene: usize, sampler: usize) -> Option<&Slope> {
+        self.slopes.iter().find(|s| s.scene == scene && s.sampler == sampler)
+    }
+
+    /// The times of a cell.
+    pub fn speed(&self, cell: &Cell) -> Option<&Speed> {
+        let same = |s: &&Speed| s.scene == cell.scene && s.sampler == cell.sampler && s.spp == cell.spp;
+        self.speeds.iter().find(same)
+    }
+
+    /// The index of the sampler that `preset` of `points` stands for.
+    pub fn preset(&self, points: Points, preset: Preset) -> Option<usize> {
+        let canonical = preset.of(points)?.to_string();
+        self.samplers.iter().position(|sampler| sampler.canonical == canonical)
+    }
+
+    /// The index of uniform sampling, what all others are measured against.
+    pub fn uniform(&self) -> Option<usize> {
+        self.preset(Points::Uniform, Preset::Best)
+    }
+
+    /// The families of which both the literal reading (`:sheet`) and its cure (`:best`) were run, where they differ.
+    pub fn literal_pairs(&self) -> Vec<(usize, usize)> {
+        let pair = |&points: &Points| Some((self.preset(points, Preset::Sheet)?, self.preset(points, Preset::Best)?));
+        Points::ALL.iter().filter_map(pair).filter(|(sheet, best)| sheet != best).collect()
+    }
+
+    /// The most samples per pixel that were asked for.
+    pub fn most_spp(&self) -> Option<u32> {
+        self.about.experiment.spp.iter().copied().max()
+    }
+
+    /// The count near the middle of a comparison: the largest one of at most 64, else the smallest.
+    pub fn middle_spp(&self) -> Option<u32> {
+        let spp = &self.about.experiment.spp;
+        spp.iter().copied().filter(|&n| n <= 64).max().or(spp.iter().copied().min())
+    }
+
+    /// The counts between which the course of an error is judged: the most, and the smallest power of two above 1 that
+    /// is at least a sixteenth of it.
+    pub fn course_counts(&self) -> Option<(u32, u32)> {
+        let most = self.most_spp()?;
+        let from = self.about.experiment.spp.iter().copied();
+        let from = from.filter(|&n| n > 1 && n < most && n.is_power_of_two() && n >= most / 16).min()?;
+        Some((from, most))
+    }
+
+    /// Where the error of a sampler goes between the [`course_counts`](Self::course_counts).
+    pub fn course(&self, scene: usize, sampler: usize) -> Option<Course> {
+        let (from, to) = self.course_counts()?;
+        let (from, to) = (self.cell(scene, sampler, from)?, self.cell(scene, sampler, to)?);
+        Some(Course {
+            rmse_ratio: ratio_of_roots(&to.mse, &from.mse)?,
+            independent: (f64::from(from.spp.taken) / f64::from(to.spp.taken)).sqrt(),
+            bias2: to.bias2,
+            bias2_ratio: ratio(&to.bias2, &from.bias2),
+        })
+    }
+}
+
+/// Gathers what the rows say of the experiment in `about`.
+///
+/// Of rows that stand for the same thing the last one counts. Timings are kept apart: nothing but
+/// [`Summary::speeds`] comes from them.
+pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
+    let index = Index::new(rows);
+    let samplers = samplers(&about.experiment);
+    let mut summary = Summary {
+        about: about.clone(),
+        scenes: (0..about.scenes.len()).map(|i| index.scene(about, i)).collect(),
+        samplers,
+        cells: Vec::new(),
+        slopes: Vec::new(),
+        point_sets: Vec::new(),
+        pictures: Vec::new(),
+        picture_reference: None,
+        stages: index.stages.clone(),
+        speeds: Vec::new(),
+        missing: Vec::new(),
+    };
+    index.add_cells(&mut summary);
+    add_slopes(&mut summary);
+    index.add_points(&mut summary);
+    index.add_pictures(&mut summary);
+    index.add_speeds(&mut summary, timings);
+    summary
+}
+
+/// The experiment's samplers, texts that mean the same one together.
+fn samplers(experiment: &Experiment) -> Vec<SamplerSummary> {
+    let mut samplers: Vec<SamplerSummary> = Vec::new();
+    for text in &experiment.samplers {
+        let spec = SamplerSpec::parse(text, Preset::Best).ok();
+        let canonical = spec.map_or_else(|| text.clone(), |spec| spec.to_string());
+        match samplers.iter_mut().find(|known| known.canonical == canonical) {
+            Some(known) => known.names.push(text.clone()),
+            None => samplers.push(SamplerSummary { canonical, names: vec![text.clone()], label: String::new(), spec }),
+        }
+    }
+    for sampler in &mut samplers {
+        sampler.label = label(&sampler.names);
+    }
+    samplers
+}
+
+/// One name for a sampler of several: the part before the first colon, where they share it.
+fn label(names: &[String]) -> String {
+    let family = |name: &str| name.split(':').next().unwrap_or(name).to_owned();
+    match names {
+        [one] if one.contains(':') || one == "center" => one.clone(),
+        // What a bare name stood for (SPEC §4).
+        [one] => format!("{one}:best"),
+        _ if names.iter().all(|name| family(name) == family(&names[0])) => family(&names[0]),
+        _ => names.join(" = "),
+    }
+}
+
+/// Rows by what they stand for.
+struct Index<'a> {
+    images: HashMap<&'a str, &'a ImageRow>,
+    references: HashMap<&'a str, &'a ReferenceRow>,
+    ensembles: HashMap<(&'a str, &'a str, u32), &'a EnsembleRow>,
+    points: HashMap<(&'a str, u32), Vec<&'a PointsRow>>,
+    pictures: Vec<&'a ImageRow>,
+    stages: Vec<ImageRow>,
+}
+
+impl<'a> Index<'a> {
+    fn new(rows: &'a [Row]) -> Self {
+        let mut index = Self {
+            images: HashMap::new(),
+            references: HashMap::new(),
+            ensembles: HashMap::new(),
+            points: HashMap::new(),
+            pictures: Vec::new(),
+            stages: Vec::new(),
+        };
+        for row in rows {
+            match row {
+                Row::Reference(row) => drop(index.references.insert(&row.id, row)),
+                Row::Ensemble(row) => drop(index.ensembles.insert((&row.scene, &row.sampler, row.spp.asked), row)),
+                Row::Points(row) => {
+                    let sets = index.points.entry((&row.sampler, row.n.asked)).or_default();
+                    sets.retain(|other| other.replicate != row.replicate);
+                    sets.push(row);
+                }
+                Row::Image(row) => {
+                    index.images.insert(&row.id, row);
+                    match row.kind {
+                        Kind::Picture => {
+                            index.pictures.retain(|other| other.sampler != row.sampler);
+                            index.pictures.push(row);
+                        }
+                        Kind::Stage => {
+                            index.stages.retain(|other| other.stage != row.stage);
+                            index.stages.push(row.clone());
+                        }
+                        _ => {}
+                    }
+                }
+            }
+        }
+        index.points.values_mut().for_each(|sets| sets.sort_by_key(|row| row.replicate));
+        index
+    }
+
+    /// Scene `i` with the reference that its ensembles were compared with.
+    fn scene(&self, about: &About, i: usize) -> SceneSummary {
+        let facts = &about.scenes[i];
+        let size = about.experiment.scenes.get(i).map_or(facts.size, |name| about.experiment.size.of(name, facts.size));
+        let used = self.ensembles.values().find(|row| row.scene == facts.name && row.size == size);
+        let by_id = used.and_then(|row| self.references.get(row.reference_id.as_str()).copied());
+        let mut by_size: Vec<_> =
+            self.references.values().filter(|row| row.scene == facts.name && row.size == size).copied().collect();
+        by_size.sort_by(|a, b| a.id.cmp(&b.id));
+        SceneSummary {
+            name: facts.name.clone(),
+            layout: facts.layout.clone(),
+            lens: facts.lens,
+            has_closed_form: facts.exact_reference,
+            size: size.to_string(),
+            pixels: size.pixels(),
+            reference: by_id.or(by_size.first().copied()).cloned(),
+        }
+    }
+
+    /// One cell for each ensemble that is there; the others are missing.
+    fn add_cells(&self, summary: &mut Summary) {
+        let (mut missing, mut first) = (0, None);
+        for scene in 0..summary.scenes.len() {
+            for sampler in 0..summary.samplers.len() {
+                for &asked in &summary.about.experiment.spp {
+                    let (s, p) = (&summary.scenes[scene], &summary.samplers[sampler]);
+                    match self.ensembles.get(&(s.name.as_str(), p.canonical.as_str(), asked)) {
+                        Some(row) => summary.cells.push(self.cell(row, scene, sampler, s, p)),
+                        None => {
+                            missing += 1;
+                            first.get_or_insert_with(|| format!("{}, {}, {asked} spp", s.name, p.label));
+                        }
+                    }
+                }
+            }
+        }
+        let of = summary.cells.len() + missing;
+        let references = summary.scenes.iter().filter(|scene| scene.reference.is_none());
+        summary.missing.extend(references.map(|scene| format!("the reference of {}", scene.name)));
+        if let Some(first) = first {
+            let what = format!("{missing} of {of} comparisons of a sampler with its reference (the first: {first})");
+            summary.missing.push(what);
+        }
+    }
+
+    fn cell(&self, row: &EnsembleRow, scene: usize, sampler: usize, s: &SceneSummary, p: &SamplerSummary) -> Cell {
+        let members: Vec<&ImageRow> =
+            row.members.iter().filter_map(|id| self.images.get(id.as_str()).copied()).collect();
+        let is_fixed = row.replicates == 1 && is_fixed(p, s);
+        let is_exact = is_fixed && s.has_closed_form;
+        // A single image of a random sampler: the row's interval holds the reference's noise alone, not its own.
+        let known = |e: Estimate| match (row.replicates, is_exact) {
+            (1, true) => Estimate { ci95: e.ci95.or(Some([e.value; 2])), ..e },
+            (1, false) if !is_fixed => Estimate::without_interval(e.value),
+            _ => e,
+        };
+        Cell {
+            scene,
+            sampler,
+            id: row.id.clone(),
+            spp: row.spp,
+            replicates: row.replicates,
+            is_fixed,
+            mse: known(row.mse),
+            rmse: row.rmse.map(known),
+            rel_mse: known(row.rel_mse),
+            bias2: known(row.bias2),
+            variance: row.variance,
+            bias: known(row.bias),
+            // One image's correlation has no spread over replicates; of a fixed sampler it is all there is.
+            error_autocorrelation: row.error_autocorrelation,
+            replicate_mse: members.iter().filter_map(|m| m.errors.as_ref()).map(|e| e.mse_unbiased).collect(),
+            replicate_mean: members.iter().map(|m| m.mean).collect(),
+            pixels: members.iter().map(|m| m.pixels.clone()).collect(),
+        }
+    }
+
+    /// Point-set metrics, means over replicates.
+    fn add_points(&self, summary: &mut Summary) {
+        let Some(points) = summary.about.experiment.points.clone() else { return };
+        let (mut missing, mut expected) = (0, 0);
+        for sampler in 0..summary.samplers.len() {
+            for &n in &points.n {
+                let p = &summary.samplers[sampler];
+                expected += 1;
+                let Some(sets) = self.points.get(&(p.canonical.as_str(), n)) else {
+                    missing += 1;
+                    continue;
+                };
+                let is_fixed = p.spec.is_some_and(|spec| !spec.is_random());
+                let of_metric = |metric: &String| point_set(sampler, metric, sets, is_fixed);
+                summary.point_sets.extend(points.metrics.iter().map(of_metric));
+            }
+        }
+        if missing > 0 {
+            summary.missing.push(format!("{missing} of {expected} point sets"));
+        }
+    }
+
+    /// Pictures by sampler, and what they were compared with.
+    fn add_pictures(&self, summary: &mut Summary) {
+        let Some(pictures) = &summary.about.experiment.pictures else { return };
+        let of = |sampler: &SamplerSummary| {
+            self.pictures.iter().find(|row| row.sampler == sampler.canonical && row.size == pictures.size)
+        };
+        let found: Vec<ImageRow> = summary.samplers.iter().filter_map(of).map(|&row| row.clone()).collect();
+        if found.len() < summary.samplers.len() {
+            let missing = summary.samplers.len() - found.len();
+            summary.missing.push(format!("{missing} of {} pictures", summary.samplers.len()));
+        }
+        if summary.stages.len() < 4 {
+            summary.missing.push(format!("{} of 4 stages of Figure 1", 4 - summary.stages.len()));
+        }
+        let id = found.iter().find_map(|row| row.errors.as_ref()).map(|errors| errors.reference_id.as_str());
+        summary.picture_reference = id.and_then(|id| self.references.get(id)).map(|&row| row.clone());
+        summary.pictures = found;
+        summary.stages.sort_by_key(|row| row.stage as u8);
+    }
+
+    /// Seconds of the images of each cell; of an image that was timed twice the last time counts.
+    fn add_speeds(&self, summary: &mut Summary, timings: &[Timing]) {
+        let by_id: HashMap<&str, &Timing> = timings.iter().map(|timing| (timing.id.as_str(), timing)).collect();
+        for cell in &summary.cells {
+            let (s, p) = (&summary.scenes[cell.scene], &summary.samplers[cell.sampler]);
+            let key = (s.name.as_str(), p.canonical.as_str(), cell.spp.asked);
+            let members = self.ensembles.get(&key).into_iter().flat_map(|row| &row.members);
+            let timed: Vec<&Timing> = members.filter_map(|id| by_id.get(id.as_str()).copied()).collect();
+            let Some(seconds) = median(timed.iter().map(|timing| timing.seconds).collect()) else { continue };
+            let threads = timed.iter().map(|timing| timing.threads).max().unwrap_or(1);
+            let Cell { scene, sampler, spp, .. } = *cell;
+            summary.speeds.push(Speed { scene, sampler, spp, seconds, images: timed.len(), threads });
+        }
+    }
+}
+
+/// Whether another seed gives the same image: the sheet's 1-D samplers are jittered also where its 2-D ones are not.
+fn is_fixed(sampler: &SamplerSummary, scene: &SceneSummary) -> bool {
+    let has_1d = scene.layout.contains(Decision::LightPick.name());
+    sampler.spec.is_some_and(|spec| !(spec.is_random() || spec.sheet_1d && has_1d))
+}
+
+fn point_set(sampler: usize, metric: &str, sets: &[&PointsRow], is_fixed: bool) -> PointSet {
+    let values: Vec<Option<f64>> = sets.iter().map(|row| row.metrics.get(metric).copied().flatten()).collect();
+    let all: Option<Vec<f64>> = values.iter().copied().collect();
+    let mean = all.filter(|all| !all.is_empty()).map(|all| match is_fixed {
+        true => Estimate { value: all[0], ci95: Some([all[0]; 2]) },
+        false => t_interval(&all, 0.95),
+    });
+    let (n, id) = (sets[0].n, sets[0].id.clone());
+    PointSet { sampler, n, metric: metric.to_owned(), mean, values, id }
+}
+
+/// The middle value with the range as its interval.
+fn median(mut values: Vec<f64>) -> Option<Estimate> {
+    values.sort_by(f64::total_cmp);
+    let (&low, &high) = (values.first()?, values.last()?);
+    let middle = (values[(values.len() - 1) / 2] + values[values.len() / 2]) / 2.0;
+    Some(Estimate { value: middle, ci95: (values.len() > 1).then_some([low, high]) })
+}
+
+/// Slopes of RMSE, by scene and sampler.
+fn add_slopes(summary: &mut Summary) {
+    let seed = summary.about.experiment.seed;
+    for scene in 0..summary.scenes.len() {
+        for sampler in 0..summary.samplers.len() {
+            let cells = summary.cells_of(scene, sampler);
+            let is_usable = |cell: &&&Cell| {
+                SLOPE_COUNTS.contains(&cell.spp.asked)
+                    && cell.spp.asked.is_power_of_two()
+                    && cell.spp.taken == cell.spp.asked
+                    && cell.replicate_mse.len() == cell.replicates as usize
+            };
+            let cells: Vec<&Cell> = cells.iter().filter(is_usable).copied().collect();
+            let ns: Vec<f64> = cells.iter().map(|cell| f64::from(cell.spp.taken)).collect();
+            let mse: Vec<Vec<f64>> = cells.iter().map(|cell| cell.replicate_mse.clone()).collect();
+            let counts = cells.iter().map(|cell| cell.spp.taken).collect();
+            let fit = slope_with_interval(&ns, &mse, seed);
+            summary.slopes.push(Slope { scene, sampler, counts, fit });
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! From a folder of results to a folder with a report. Renders nothing.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::experiment::results::{about_path, read, read_about, read_timings, results_path, timings_path};
+use crate::film::write_whole;
+
+use super::figure::{Figure, Rgb8};
+use super::summarise::{Summary, summarise};
+use super::{charts, pictured, provenance, sections, tables};
+
+/// What became of a figure.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum FigureState {
+    /// Drawn from the rows, or from rows and images.
+    Drawn,
+    /// Its images are not there, so the file of an earlier report was kept.
+    Kept,
+    /// It cannot be drawn; why.
+    Absent(String),
+}
+
+/// The figures of a report by name, the names of files in `figures/` without their ending.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Figures {
+    states: BTreeMap<String, FigureState>,
+    /// What the enlarged details show, left to right.
+    pub details: Vec<String>,
+}
+
+impl Figures {
+    /// What became of `name`; a figure that nobody asked for is absent.
+    pub fn state(&self, name: &str) -> FigureState {
+        self.states.get(name).cloned().unwrap_or(FigureState::Absent("its rows are not there".to_owned()))
+    }
+
+    /// Notes a figure down.
+    pub fn set(&mut self, name: &str, state: FigureState) {
+        self.states.insert(name.to_owned(), state);
+    }
+}
+
+/// A report that was written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Written {
+    /// Its file.
+    pub report: PathBuf,
+    /// What it says, as numbers.
+    pub summary: Summary,
+    /// Its figures.
+    pub figures: Figures,
+}
+
+impl Written {
+    /// Whether everything that the experiment asks for is there.
+    ///
+    /// # Errors
+    /// Kind `Incomplete` that says what is missing.
+    pub fn check(&self) -> Result<()> {
+        match self.summary.missing.as_slice() {
+            [] => Ok(()),
+            missing => Err(Error::incomplete(self.report.display(), format!("missing: {}", missing.join("; ")))),
+        }
+    }
+}
+
+/// Writes `report.md`, `summary.csv`, `slopes.csv` and `figures/` from the rows in `dir`.
+///
+/// The same rows, timings and images give the same bytes; `summary.csv` and `slopes.csv` depend on rows alone.
+/// Figures of images that are not there keep their earlier file, and the report says so. Missing rows do not fail: the
+/// report says what is missing, and [`Written::check`] tells.
+///
+/// # Errors
+/// Kind `Input` where `experiment.json`, `results.jsonl` or `timings.jsonl` do not read, kind `Write` where a file cannot
+/// be written.
+pub fn write(dir: &Path) -> Result<Written> {
+    let about = read_about(&about_path(dir))?;
+    let rows = read(&results_path(dir))?;
+    let timings = if timings_path(dir).exists() { read_timings(&timings_path(dir))? } else { Vec::new() };
+    let summary = summarise(&rows, &timings, &about);
+    let figures = draw(dir, &summary)?;
+    write_whole(&dir.join("summary.csv"), tables::summary_csv(&summary).as_bytes())?;
+    write_whole(&dir.join("slopes.csv"), tables::slopes_csv(&summary).as_bytes())?;
+    let report = dir.join("report.md");
+    write_whole(&report, sections::report(&summary, &figures).as_bytes())?;
+    Ok(Written { report, summary, figures })
+}
+
+/// Draws all figures.
+fn draw(dir: &Path, summary: &Summary) -> Result<Figures> {
+    let mut pen =
+        Pen { folder: dir.join("figures"), stamp: provenance::line(&summary.about), figures: Figures::default() };
+    let no_rows = || "its rows are not there".to_owned();
+    pen.raster("point-sets", charts::point_sets(summary).ok_or_else(no_rows))?;
+    pen.chart("discrepancy", charts::discrepancy(summary))?;
+    pen.chart("convergence", charts::convergence(summary))?;
+    pen.chart("bias-and-variance", charts::bias_and_variance(summary))?;
+    for (i, scene) in summary.scenes.iter().enumerate() {
+        pen.chart(&charts::speed_name(&scene.name), charts::speed(summary, i))?;
+    }
+    if summary.stages.len() == 4 {
+        pen.raster("stages", pictured::stages(dir, summary).map_err(|e| e.to_string()))?;
+    }
+    if !summary.pictures.is_empty() {
+        match pictured::strips(dir, summary) {
+            Ok(strips) => {
+                pen.raster("reference", Ok(strips.whole))?;
+                if let Some(details) = strips.details {
+                    pen.raster("details", Ok(details))?;
+                }
+                pen.raster("errors", Ok(strips.errors))?;
+                pen.figures.details = strips.names.into_iter().map(str::to_owned).collect();
+            }
+            Err(e) => {
+                for name in ["reference", "details", "errors"] {
+                    pen.raster(name, Err(e.to_string()))?;
+                }
+            }
+        }
+    }
+    Ok(pen.figures)
+}
+
+/// Writes figures and keeps book of them.
+struct Pen {
+    folder: PathBuf,
+    stamp: String,
+    figures: Figures,
+}
+
+impl Pen {
+    fn chart(&mut self, name: &str, figure: Option<Figure>) -> Result<()> {
+        let Some(figure) = figure else { return Ok(()) };
+        let svg = provenance::stamped_svg(&figure.svg, &self.stamp);
+        write_whole(&self.folder.join(format!("{name}.svg")), svg.as_bytes())?;
+        self.raster(name, Ok(figure.raster))
+    }
+
+    /// Writes a raster, or says why there is none and whether an earlier one was kept.
+    fn raster(&mut self, name: &str, raster: std::result::Result<Rgb8, String>) -> Result<()> {
+        let path = self.folder.join(format!("{name}.png"));
+        let state = match raster {
+            Ok(raster) => {
+                raster.write(&path)?;
+                let png = std::fs::read(&path).map_err(|e| Error::write(&path, e))?;
+                write_whole(&path, &provenance::stamped_png(&png, &self.stamp))?;
+                FigureState::Drawn
+            }
+            Err(_) if path.exists() => FigureState::Kept,
+            Err(why) => FigureState::Absent(why),
+        };
+        self.figures.set(name, state);
+        Ok(())
+    }
+}
