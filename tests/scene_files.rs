@@ -421,7 +421,7 @@ fn a_texture_is_decoded_once_and_multiplies_the_colour() {
     let mesh = folder.open(&[]).unwrap().mesh;
     assert_eq!((mesh.materials[0].texture, mesh.materials[1].texture), (Some(0), Some(0)));
     assert_eq!((mesh.materials[0].albedo, mesh.materials[1].albedo), (Vec3::splat(0.5), Vec3::ONE));
-    let [r, g, b] = mesh.textures[0].texels[0];
+    let [r, g, b] = mesh.textures[0].texel(0, 0);
     assert_eq!((mesh.textures[0].width, mesh.textures[0].height, r, b), (2, 1, 0.0, 1.0));
     // 188/255 is the sRGB code nearest to linear one half (IEC 61966-2-1): 0.50289.
     assert!((g - 0.50289).abs() < 1e-5, "{g}");

@@ -101,15 +101,14 @@ pub(crate) fn smaller(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// Distance at which one ray meets one triangle with padded box `bounds`, by the one formula: finite and above 0 where it
-/// does, negative where it does not (also for triangles without area).
+/// Distance at which one ray meets one triangle whose padded box it enters at `near` and leaves at `far` (by [`slab`]), by
+/// the one formula: finite and above 0 where it does, negative where it does not (also for triangles without area).
 ///
 /// Edge functions are triple products of corners relative to the ray's origin (Plücker coordinates, as in Davidovič et al.
 /// 2012, doi:10.1145/2159516.2159519): for an edge that two triangles share they differ in sign only, so no ray slips between.
 /// Branch-free, so that a loop over lanes becomes vector instructions that do the same operations in the same order.
 #[inline(always)]
-pub(crate) fn meet(corners: &[Vec3; 3], bounds: &Bounds, origin: Vec3, direction: Vec3, reciprocal: Vec3) -> f32 {
-    let (near, far) = slab(bounds.min, bounds.max, origin, reciprocal);
+pub(crate) fn meet(corners: &[Vec3; 3], near: f32, far: f32, origin: Vec3, direction: Vec3) -> f32 {
     let (a, b, c) = (corners[0] - origin, corners[1] - origin, corners[2] - origin);
     let (ca, ab, bc) = (c - a, a - b, b - c);
     let u = dot(cross(ca, c + a), direction);

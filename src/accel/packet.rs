@@ -109,30 +109,42 @@ impl Packet {
         (at(&self.origin), at(&self.direction), at(&self.reciprocal))
     }
 
-    /// Which lanes meet a box no farther than their limit, as bits, and how near the first of them enters it.
+    /// Where each lane enters and leaves a box, and which lanes meet it no farther than their limit, as bits.
     #[inline(always)]
-    fn meets(&self, bounds: &Bounds) -> (u32, f32) {
-        let mut near = [0.0f32; LANES];
+    fn crossings(&self, bounds: &Bounds) -> ([f32; LANES], [f32; LANES], u32) {
+        let (mut near, mut far) = ([0.0f32; LANES], [0.0f32; LANES]);
         let mut met = [0u32; LANES];
         for l in 0..LANES {
             let (origin, _, reciprocal) = self.lane(l);
-            let (enter, leave) = slab(bounds.min, bounds.max, origin, reciprocal);
-            near[l] = enter;
-            met[l] = u32::from((enter <= leave) & (leave >= 0.0) & (enter <= self.limit[l]));
+            (near[l], far[l]) = slab(bounds.min, bounds.max, origin, reciprocal);
+            met[l] = u32::from((near[l] <= far[l]) & (far[l] >= 0.0) & (near[l] <= self.limit[l]));
         }
         let mut mask = 0;
         for (l, &m) in met.iter().enumerate() {
             mask |= m << l;
         }
+        (near, far, mask)
+    }
+
+    /// Which lanes meet a box no farther than their limit, as bits, and how near the first of them enters it.
+    #[inline(always)]
+    fn meets(&self, bounds: &Bounds) -> (u32, f32) {
+        let (near, _, mask) = self.crossings(bounds);
         (mask, near[mask.trailing_zeros() as usize % LANES])
     }
 
     /// Tests a triangle against all lanes and keeps the nearest hit, of equally near ones the lowest triangle.
+    ///
+    /// A hit lies in the interval of the triangle's own box: where no lane meets that box, nothing is left to decide.
     #[inline(always)]
     fn closest_of(&mut self, slot: &Slot) {
+        let (near, far, mask) = self.crossings(&slot.bounds);
+        if mask == 0 {
+            return;
+        }
         for l in 0..LANES {
-            let (origin, direction, reciprocal) = self.lane(l);
-            let t = meet(&slot.corners, &slot.bounds, origin, direction, reciprocal);
+            let (origin, direction, _) = self.lane(l);
+            let t = meet(&slot.corners, near[l], far[l], origin, direction);
             let nearer = (t > 0.0) & ((t < self.limit[l]) | ((t == self.limit[l]) & (slot.id < self.triangle[l])));
             // A limit is not a hit: the first hit must lie strictly before it, and then has a triangle.
             let nearer = nearer & !((t == self.limit[l]) & (self.triangle[l] == NOTHING));
@@ -144,9 +156,13 @@ impl Packet {
     /// Tests a triangle against all lanes and retires the lanes that it stops.
     #[inline(always)]
     fn any_of(&mut self, slot: &Slot) {
+        let (near, far, mask) = self.crossings(&slot.bounds);
+        if mask == 0 {
+            return;
+        }
         for l in 0..LANES {
-            let (origin, direction, reciprocal) = self.lane(l);
-            let t = meet(&slot.corners, &slot.bounds, origin, direction, reciprocal);
+            let (origin, direction, _) = self.lane(l);
+            let t = meet(&slot.corners, near[l], far[l], origin, direction);
             let stopped = (t > 0.0) & (t < self.limit[l]);
             self.limit[l] = if stopped { f32::NEG_INFINITY } else { self.limit[l] };
             self.triangle[l] = if stopped { slot.id } else { self.triangle[l] };
@@ -271,7 +287,8 @@ mod tests {
         let mut best: Option<Hit> = None;
         for (i, triangle) in triangles.iter().enumerate() {
             let bounds = triangle.bounds(box_padding(reach));
-            let t = meet(&triangle.corners, &bounds, ray.origin, ray.direction, reciprocal_of(ray.direction));
+            let (near, far) = slab(bounds.min, bounds.max, ray.origin, reciprocal_of(ray.direction));
+            let t = meet(&triangle.corners, near, far, ray.origin, ray.direction);
             if t > 0.0 && t < best.map_or(limit, |b| b.t) {
                 best = Some(Hit { t, triangle: i as u32 });
             }

@@ -100,7 +100,7 @@ pub fn render_observed<S: PointSource>(
 /// Traces one sample alone: what [`render`] adds to pixel (x, y) for `index`.
 pub fn render_sample<S: PointSource>(scene: &Scene, source: &S, x: u32, y: u32, index: u32) -> Vec3 {
     let mut lanes = Lanes::default();
-    lanes.gather(scene, source, &[Span { x, y, first: index, lane: 0, count: 1 }]);
+    lanes.gather(scene, source, &[Span { pixel: 0, x, y, first: index, lane: 0, count: 1 }]);
     lanes.trace(scene);
     lanes.radiance[0]
 }
@@ -113,6 +113,8 @@ struct TileResult {
 /// Consecutive samples of one pixel, and the lanes they take.
 #[derive(Clone, Copy)]
 struct Span {
+    /// The pixel's place in its tile.
+    pixel: usize,
     x: u32,
     y: u32,
     first: u32,
@@ -155,33 +157,34 @@ fn render_pixels<S: PointSource>(
 ) -> Result<TileResult, NonFinite> {
     let samples = source.samples();
     let mut sums = vec![[0.0f64; 3]; pixels.len()];
-    let total = pixels.len() as u64 * u64::from(samples);
     let mut spans: Vec<Span> = Vec::with_capacity(LANES);
     lanes.ray_count = 0;
     // Samples are numbered through the tile, pixel by pixel; each packet takes the next ones.
-    let mut next = 0u64;
-    while next < total {
+    let (mut pixel, mut first) = (0, 0);
+    while pixel < pixels.len() {
         spans.clear();
         let mut lane = 0;
-        while lane < LANES && next < total {
-            let ((x, y), first) = (pixels[(next / u64::from(samples)) as usize], (next % u64::from(samples)) as u32);
+        while lane < LANES && pixel < pixels.len() {
+            let (x, y) = pixels[pixel];
             let count = (LANES - lane).min((samples - first) as usize);
-            spans.push(Span { x, y, first, lane, count });
+            spans.push(Span { pixel, x, y, first, lane, count });
             lane += count;
-            next += count as u64;
+            first += count as u32;
+            if first == samples {
+                (pixel, first) = (pixel + 1, 0);
+            }
         }
         lanes.gather(scene, source, &spans);
         lanes.trace(scene);
-        let before = next - lane as u64;
-        for (k, radiance) in lanes.radiance[..lane].iter().enumerate() {
-            let at = before + k as u64;
-            let pixel = (at / u64::from(samples)) as usize;
-            if !radiance.is_finite() {
-                let (x, y) = pixels[pixel];
-                return Err(NonFinite { x, y, index: (at % u64::from(samples)) as u32, radiance: *radiance });
-            }
-            for (sum, c) in sums[pixel].iter_mut().zip(radiance.to_array()) {
-                *sum += f64::from(c);
+        for span in &spans {
+            let sum = &mut sums[span.pixel];
+            for (index, radiance) in (span.first..).zip(&lanes.radiance[span.lane..span.lane + span.count]) {
+                if !radiance.is_finite() {
+                    return Err(NonFinite { x: span.x, y: span.y, index, radiance: *radiance });
+                }
+                for (sum, c) in sum.iter_mut().zip(radiance.to_array()) {
+                    *sum += f64::from(c);
+                }
             }
         }
     }
@@ -242,7 +245,7 @@ impl Lanes {
         for lane in 0..self.used {
             self.radiance[lane] = Vec3::ZERO;
             let Some(hit) = self.view.hit(lane) else { continue };
-            let point = surface_point(&scene.mesh, &self.rays[lane], hit);
+            let point = surface_point(&scene.faces[hit.triangle as usize], &self.rays[lane]);
             let Some(lights) = &scene.lights else {
                 self.radiance[lane] = albedo(scene, &point);
                 continue;

@@ -50,37 +50,57 @@ pub const fn bits64(key: u64, at: u64) -> u64 {
     mix64(key ^ mix64(at.wrapping_add(GOLDEN)))
 }
 
-/// Place of `index` under a random permutation of `0..n` that `key` names; `index < n`.
+/// A random permutation of `0..n` that a key names.
 ///
 /// A bijection of the next power of two (rounds of odd multiplication, xor-shift and addition, each invertible modulo
 /// 2ᵏ), walked along its cycle until it lands below `n`, as in Kensler 2013 (Pixar memo 13-01). For n ≤ 4 all n!
 /// permutations occur equally often within the error of the test below.
+#[derive(Debug, Clone, Copy)]
+pub struct Permutation {
+    n: u32,
+    mask: u32,
+    shift: u32,
+    keys: [u32; 4],
+}
+
+impl Permutation {
+    /// The permutation of `0..n` under `key`; n ≥ 1.
+    #[inline]
+    pub const fn new(n: u32, key: u64) -> Self {
+        let bits = 32 - (n - 1).leading_zeros();
+        let second = mix64(key ^ GOLDEN);
+        // Eight rounds with 16 fresh key bits each: two words of key, read from different places.
+        let keys = [key as u32, (key >> 32) as u32, second as u32, (second >> 32) as u32];
+        Self { n, mask: ((1u64 << bits) - 1) as u32, shift: bits.div_ceil(2), keys }
+    }
+
+    /// Place of `index`, which is below n.
+    #[inline(always)]
+    pub const fn place(&self, index: u32) -> u32 {
+        debug_assert!(index < self.n);
+        let mut x = index;
+        loop {
+            // Only the bits below `mask` matter to what follows them, so it is enough to mask before each shift to the right.
+            let mut i = 0;
+            while i < 4 {
+                let k = self.keys[i];
+                x = x.wrapping_add(k).wrapping_mul((k >> 15) | 1) & self.mask;
+                x ^= x >> self.shift;
+                x = x.wrapping_add(k >> 7).wrapping_mul((k >> 21) | 1) & self.mask;
+                x ^= x >> 1;
+                i += 1;
+            }
+            if x < self.n {
+                return x;
+            }
+        }
+    }
+}
+
+/// Place of `index` under the [`Permutation`] of `0..n` that `key` names; `index < n`.
 #[inline]
 pub fn permute(index: u32, n: u32, key: u64) -> u32 {
-    debug_assert!(index < n);
-    if n == 1 {
-        return 0;
-    }
-    let bits = 32 - (n - 1).leading_zeros();
-    let mask = ((1u64 << bits) - 1) as u32;
-    let shift = bits.div_ceil(2);
-    let second = mix64(key ^ GOLDEN);
-    // Eight rounds with 16 fresh key bits each: two words of key, read from different places.
-    let keys = [key as u32, (key >> 32) as u32, second as u32, (second >> 32) as u32];
-    let mut x = index;
-    loop {
-        for k in keys {
-            x = x.wrapping_add(k) & mask;
-            x = x.wrapping_mul((k >> 15) | 1) & mask;
-            x ^= x >> shift;
-            x = x.wrapping_add(k >> 7) & mask;
-            x = x.wrapping_mul((k >> 21) | 1) & mask;
-            x ^= x >> 1;
-        }
-        if x < n {
-            return x;
-        }
-    }
+    Permutation::new(n, key).place(index)
 }
 
 /// The unit-interval float of a 32-bit fraction: its top 24 bits, so that it is exact and always below 1.

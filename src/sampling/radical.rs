@@ -56,16 +56,30 @@ pub fn digit_count(base: u32, n: u32) -> u32 {
 /// follow become independent uniform digits: one uniform tail.
 #[inline]
 pub fn digit_scrambled(base: u32, digits: u32, index: u32, key: u64) -> u32 {
+    // The first bases by name: the compiler then divides by constants.
+    match base {
+        2 => scrambled(2, digits, index, key),
+        3 => scrambled(3, digits, index, key),
+        5 => scrambled(5, digits, index, key),
+        7 => scrambled(7, digits, index, key),
+        11 => scrambled(11, digits, index, key),
+        13 => scrambled(13, digits, index, key),
+        _ => scrambled(base, digits, index, key),
+    }
+}
+
+#[inline(always)]
+fn scrambled(base: u32, digits: u32, index: u32, key: u64) -> u32 {
     let b = u64::from(base);
     let (mut rest, mut prefix, mut power, mut mirror) = (index, 0u64, 1u64, 0u64);
     for level in 0..digits {
-        let digit = u64::from(rest % base);
+        let digit = rest % base;
         rest /= base;
         let draw = bits64(key, prefix | (u64::from(level) << 40));
-        let factor = 1 + (((draw >> 32) * (b - 1)) >> 32);
-        let offset = ((draw & 0xffff_ffff) * b) >> 32;
-        mirror = mirror * b + (factor * digit + offset) % b;
-        prefix += digit * power;
+        let factor = 1 + (((draw >> 32) * (b - 1)) >> 32) as u32;
+        let offset = (((draw & 0xffff_ffff) * b) >> 32) as u32;
+        mirror = mirror * b + u64::from((factor * digit + offset) % base);
+        prefix += u64::from(digit) * power;
         power *= b;
     }
     let tail = bits64(key, prefix | (u64::from(digits) << 40)) >> 32;

@@ -1,6 +1,6 @@
 //! Samplers at work: a number is a pure function of (seed, pixel, sample index, dimension).
 
-use super::hash::{bits32, derive, mix64, permute, unit_f32};
+use super::hash::{Permutation, bits32, derive, mix64, unit_f32};
 use super::layout::{Claim, Decision, Dim1, Dim2, SampleLayout};
 use super::radical::{PRIMES, digit_count, digit_scrambled, radical_inverse, radical_inverse_f64};
 use super::sobol::{SobolAxis, owen_scramble};
@@ -132,8 +132,9 @@ impl PointSource for Sampler {
     fn fill_1d(&self, pixel: PixelKey, first: u32, dim: &Dim1, out: &mut [f32]) {
         let source = self.decision(dim.decision());
         let keys = source.keys(pixel);
-        for (i, out) in (first..).zip(out) {
-            *out = unit_f32(source.fraction(0, source.place(i, &keys), &keys));
+        for (block, out) in out.chunks_mut(BLOCK).enumerate() {
+            let places = source.places(first + (block * BLOCK) as u32, out.len(), &keys);
+            source.fractions(0, &places[..out.len()], &keys, |at, fraction| out[at] = unit_f32(fraction));
         }
     }
 
@@ -146,13 +147,17 @@ impl PointSource for Sampler {
             return;
         }
         let keys = source.keys(pixel);
-        for (i, (x, y)) in (first..).zip(x.iter_mut().zip(y)) {
-            let place = source.place(i, &keys);
-            *x = unit_f32(source.fraction(0, place, &keys));
-            *y = unit_f32(source.fraction(1, place, &keys));
+        for (block, (x, y)) in x.chunks_mut(BLOCK).zip(y.chunks_mut(BLOCK)).enumerate() {
+            let places = source.places(first + (block * BLOCK) as u32, x.len(), &keys);
+            for (axis, out) in [x, y].into_iter().enumerate() {
+                source.fractions(axis, &places[..out.len()], &keys, |at, fraction| out[at] = unit_f32(fraction));
+            }
         }
     }
 }
+
+/// Indices looked up at once: what stays the same along a span is decided once a block.
+const BLOCK: usize = 16;
 
 /// One decision's numbers: the specification made ready.
 #[derive(Debug, Clone)]
@@ -189,6 +194,14 @@ enum AxisKind {
 struct Keys {
     axes: [u64; 2],
     shuffle: u64,
+}
+
+/// Hands `put` the number of each place and what `fraction` makes of it.
+#[inline(always)]
+fn each(places: &[u32], mut put: impl FnMut(usize, u32), fraction: impl Fn(u32) -> u32) {
+    for (at, &place) in places.iter().enumerate() {
+        put(at, fraction(place));
+    }
 }
 
 const RANDOM_TAG: u64 = 1;
@@ -256,37 +269,63 @@ impl DecisionSampler {
         }
     }
 
-    /// π(i).
-    #[inline(always)]
-    fn place(&self, index: u32, keys: &Keys) -> u32 {
-        debug_assert!(index < self.samples, "sample {index} of {}", self.samples);
-        if self.spec.order == Order::Shuffle { permute(index, self.samples, keys.shuffle) } else { index }
+    /// π(i) for `count` ≤ [`BLOCK`] consecutive indices; what follows them is 0.
+    #[inline]
+    fn places(&self, first: u32, count: usize, keys: &Keys) -> [u32; BLOCK] {
+        debug_assert!(first as usize + count <= self.samples as usize, "sample {first} + {count} of {}", self.samples);
+        let mut places = [0; BLOCK];
+        let indices = (first..).zip(&mut places[..count]);
+        if self.spec.order == Order::Shuffle {
+            let permutation = Permutation::new(self.samples, keys.shuffle);
+            indices.for_each(|(index, place)| *place = permutation.place(index));
+        } else {
+            indices.for_each(|(index, place)| *place = index);
+        }
+        places
     }
 
-    /// R(P(i, axis)) as a 32-bit fraction.
-    #[inline(always)]
-    fn fraction(&self, axis: usize, i: u32, keys: &Keys) -> u32 {
+    /// R(P(i, axis)) as a 32-bit fraction: hands `put` the number of each place and its fraction.
+    ///
+    /// What kind of axis this is gets looked at once, so that each loop is straight arithmetic.
+    #[inline]
+    fn fractions(&self, axis: usize, places: &[u32], keys: &Keys, put: impl FnMut(usize, u32)) {
         let key = keys.axes[axis];
-        let plain = match &self.axes[axis].kind {
-            AxisKind::Uniform => return bits32(key, i),
-            AxisKind::StratifiedX => return in_stratum(i % self.strata.0, self.strata.0, bits32(key, i)),
-            AxisKind::StratifiedY => return in_stratum(i / self.strata.0, self.strata.1, bits32(key, i)),
+        let (columns, rows) = self.strata;
+        match &self.axes[axis].kind {
+            AxisKind::Uniform => each(places, put, |i| bits32(key, i)),
+            AxisKind::StratifiedX => each(places, put, |i| in_stratum(i % columns, columns, bits32(key, i))),
+            AxisKind::StratifiedY => each(places, put, |i| in_stratum(i / columns, rows, bits32(key, i))),
             AxisKind::Halton { base, digits } if self.spec.random == Random::Digits => {
-                return digit_scrambled(*base, *digits, i, key);
+                each(places, put, |i| digit_scrambled(*base, *digits, i, key));
             }
-            AxisKind::Halton { base, .. } => radical_inverse(*base, i),
-            AxisKind::HammersleyX if self.spec.random == Random::Yxor => return in_stratum(i, self.samples, 0),
-            AxisKind::HammersleyX => in_stratum(i, self.samples, 0),
-            AxisKind::VanDerCorput => i.reverse_bits(),
-            AxisKind::Sobol(sobol) => sobol.fraction(i),
-        };
-        // Keys are well mixed: their halves serve as words.
-        match self.spec.random {
-            Random::Xor | Random::Yxor => plain ^ key as u32,
-            Random::Shift => plain.wrapping_add(key as u32),
-            Random::Owen => owen_scramble(plain, key as u32),
-            Random::None | Random::Fresh | Random::Jitter | Random::Digits => plain,
+            AxisKind::Halton { base, .. } => self.randomised(key, places, put, |i| radical_inverse(*base, i)),
+            AxisKind::HammersleyX if self.spec.random == Random::Yxor => {
+                each(places, put, |i| in_stratum(i, self.samples, 0));
+            }
+            AxisKind::HammersleyX => self.randomised(key, places, put, |i| in_stratum(i, self.samples, 0)),
+            AxisKind::VanDerCorput => self.randomised(key, places, put, u32::reverse_bits),
+            AxisKind::Sobol(sobol) => self.randomised(key, places, put, |i| sobol.fraction(i)),
         }
+    }
+
+    /// As [`Self::fractions`], for a set that is randomised after its points are known.
+    #[inline(always)]
+    fn randomised(&self, key: u64, places: &[u32], put: impl FnMut(usize, u32), plain: impl Fn(u32) -> u32) {
+        // Keys are well mixed: their halves serve as words.
+        let word = key as u32;
+        match self.spec.random {
+            Random::Xor | Random::Yxor => each(places, put, |i| plain(i) ^ word),
+            Random::Shift => each(places, put, |i| plain(i).wrapping_add(word)),
+            Random::Owen => each(places, put, |i| owen_scramble(plain(i), word)),
+            Random::None | Random::Fresh | Random::Jitter | Random::Digits => each(places, put, plain),
+        }
+    }
+
+    /// One of [`Self::fractions`].
+    fn fraction(&self, axis: usize, i: u32, keys: &Keys) -> u32 {
+        let mut found = 0;
+        self.fractions(axis, &[i], keys, |_, fraction| found = fraction);
+        found
     }
 
     /// The same value correctly rounded to f64 where the 32-bit fraction is not exact.
@@ -323,7 +362,7 @@ pub fn point_set(spec: SamplerSpec, asked: u32, seed: u64) -> Result<Vec<[f64; 2
     let keys = source.keys(PixelKey::new(0, 0));
     Ok((0..sampler.samples)
         .map(|i| {
-            let place = source.place(i, &keys);
+            let [place, ..] = source.places(i, 1, &keys);
             [0, 1].map(|axis| source.coordinate_f64(axis, place, &keys))
         })
         .collect())

@@ -8,9 +8,9 @@ use crate::sampling::{Decision, SampleLayout};
 
 use super::camera::{Aperture, Camera, PixelSample};
 use super::config::{CameraConfig, Estimator, SceneConfig, Shading};
-use super::geometry;
+use super::geometry::{self, Face};
 use super::light::LightSet;
-use super::mesh::Mesh;
+use super::mesh::{Mesh, Texture};
 
 /// The four stages of the sheet's Figure 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,6 +45,8 @@ impl Stage {
 pub struct Scene {
     /// Triangles, materials, textures.
     pub mesh: Mesh,
+    /// The triangles as shading reads them.
+    pub faces: Vec<Face>,
     /// Tree over the triangles.
     pub accel: Accel,
     /// Where rays start.
@@ -104,7 +106,9 @@ impl Scene {
         }
         let camera = Camera::new(&config.camera, size, pixel, aperture);
         let focus = Focus { auto: config.auto_focus, configured: config.camera.focal_depth };
-        let mut scene = Self { mesh, accel, camera, lights, estimator: config.estimator, layout, warnings, focus };
+        let faces = geometry::faces(&mesh);
+        let mut scene =
+            Self { mesh, faces, accel, camera, lights, estimator: config.estimator, layout, warnings, focus };
         scene.refocus();
         Ok(scene)
     }
@@ -146,10 +150,11 @@ impl Scene {
     pub fn bytes(&self) -> usize {
         let mesh = &self.mesh;
         self.accel.bytes()
+            + size_of_val(self.faces.as_slice())
             + size_of_val(mesh.positions.as_slice())
             + size_of_val(mesh.normals.as_slice())
             + size_of_val(mesh.uvs.as_slice())
-            + mesh.textures.iter().map(|t| t.width as usize * t.height as usize * 12).sum::<usize>()
+            + mesh.textures.iter().map(Texture::bytes).sum::<usize>()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::accel::{Hit, Ray, Triangle};
+use crate::accel::{Ray, Triangle};
 
 use super::mesh::Mesh;
 
@@ -54,23 +54,49 @@ pub fn triangles(mesh: &Mesh) -> Vec<Triangle> {
     mesh.positions.iter().map(|&corners| Triangle { corners }).collect()
 }
 
-/// Looks up the surface where `ray` met `hit`.
+/// All that shading reads of one triangle, in one place: two cache lines.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(align(64))]
+pub struct Face {
+    corners: [Vec3; 3],
+    normals: [Vec3; 3],
+    uvs: [Vec2; 3],
+    /// See [`face_normal`].
+    face_normal: Vec3,
+    /// See [`offset_length`].
+    offset: f32,
+    material: u32,
+}
+
+/// The mesh's triangles as shading reads them, with what depends on the triangle alone worked out.
+pub fn faces(mesh: &Mesh) -> Vec<Face> {
+    (0..mesh.len())
+        .map(|index| {
+            let corners = mesh.positions[index];
+            Face {
+                corners,
+                normals: mesh.normals[index],
+                uvs: mesh.uvs[index],
+                face_normal: face_normal(&corners),
+                offset: offset_length(&corners),
+                material: mesh.material_of[index],
+            }
+        })
+        .collect()
+}
+
+/// The surface where `ray` met this face.
 #[inline]
-pub fn surface_point(mesh: &Mesh, ray: &Ray, hit: Hit) -> SurfacePoint {
-    let index = hit.triangle as usize;
-    let corners = &mesh.positions[index];
-    let b = barycentric(corners, ray);
+pub fn surface_point(face: &Face, ray: &Ray) -> SurfacePoint {
+    let b = barycentric(&face.corners, ray);
     let blend = |v: &[Vec3; 3]| v[0] * b.x + v[1] * b.y + v[2] * b.z;
-    let face = face_normal(corners);
-    let normal = blend(&mesh.normals[index]).try_normalize().unwrap_or(face);
-    let uv = mesh.uvs[index];
     SurfacePoint {
-        position: blend(corners),
-        normal,
-        face_normal: face,
-        uv: uv[0] * b.x + uv[1] * b.y + uv[2] * b.z,
-        material: mesh.material_of[index],
-        offset: offset_length(corners),
+        position: blend(&face.corners),
+        normal: blend(&face.normals).try_normalize().unwrap_or(face.face_normal),
+        face_normal: face.face_normal,
+        uv: face.uvs[0] * b.x + face.uvs[1] * b.y + face.uvs[2] * b.z,
+        material: face.material,
+        offset: face.offset,
     }
 }
 

@@ -22,7 +22,7 @@ const DEFAULT_ALBEDO: f32 = 0.8;
 /// Strength of an emitter (by its name or type) that gives none.
 const DEFAULT_STRENGTH: f32 = 10.0;
 
-/// Most pixels a texture, 2^26 (8192 × 8192): its linear texels take 0.8 GB.
+/// Most pixels a texture, 2^26 (8192 × 8192): with 16 bits a channel its linear texels take 0.8 GB.
 const MAX_TEXELS: u64 = 1 << 26;
 
 /// Most bytes a mesh file, 2^30: reading takes about ten times as much memory.
@@ -522,12 +522,14 @@ fn decode_texture(bytes: &[u8]) -> std::result::Result<Texture, String> {
     // The size is checked above; the crate's own limit on memory is lower than ours.
     reader.no_limits();
     let decoded = reader.decode().map_err(|e| e.to_string())?;
-    let texels = match decoded.color().bytes_per_pixel() / decoded.color().channel_count() {
+    Ok(match decoded.color().bytes_per_pixel() / decoded.color().channel_count() {
         1 => {
-            let linear: Vec<f32> = (0..=255u8).map(|v| srgb_decode(f32::from(v) / 255.0)).collect();
-            decoded.to_rgb8().pixels().map(|p| p.0.map(|v| linear[usize::from(v)])).collect()
+            let linear = std::array::from_fn(|code| srgb_decode(code as f32 / 255.0));
+            Texture::coded(width, decoded.to_rgb8().pixels().map(|p| p.0).collect(), Box::new(linear))
         }
-        _ => decoded.to_rgb16().pixels().map(|p| p.0.map(|v| srgb_decode(f32::from(v) / 65535.0))).collect(),
-    };
-    Ok(Texture { width, height, texels })
+        _ => {
+            let texel = |p: &image::Rgb<u16>| p.0.map(|v| srgb_decode(f32::from(v) / 65535.0));
+            Texture::new(width, decoded.to_rgb16().pixels().map(texel).collect())
+        }
+    })
 }
