@@ -27,7 +27,7 @@ pub const fn derive(seed: u64, path: &[u64]) -> u64 {
     h
 }
 
-/// Seed of a part that has a name: as [`derive`] over the bytes of `name` and its length.
+/// Seed of a part that has a name: as [`derive()`] over the bytes of `name` and its length.
 pub fn derive_named(seed: u64, name: &str) -> u64 {
     let mut h = derive(seed, &[name.len() as u64]);
     for chunk in name.as_bytes().chunks(8) {

@@ -51,7 +51,7 @@ pub fn digit_count(base: u32, n: u32) -> u32 {
 ///
 /// The j-th digit is permuted by d ↦ (a·d + c) mod b with (a, c), a ≠ 0, drawn afresh for each prefix of j − 1 digits. For
 /// prime b these maps are sharply 2-transitive: any two digits go to any two different digits equally often, so all
-/// pairwise distributions, and with them every variance and every E[D²], equal those of uniform random permutations
+/// pairwise distributions, and with them every variance and every `E[D²]`, equal those of uniform random permutations
 /// (Matoušek 1998, doi:10.1006/jcom.1998.0489). After `digits` digits (enough to tell all indices apart) the infinitely many zeros that
 /// follow become independent uniform digits: one uniform tail.
 #[inline]

@@ -4,7 +4,7 @@
 /// lines that begin with `#`.
 const JOE_KUO: &str = include_str!("new-joe-kuo-6.256.txt");
 
-/// One coordinate of the Sobol' sequence, ready to look up: x = T₀[i₀] ⊕ T₁[i₁] ⊕ T₂[i₂] for the bytes of a 24-bit index.
+/// One coordinate of the Sobol' sequence, ready to look up: `x = T₀[i₀] ⊕ T₁[i₁] ⊕ T₂[i₂]` for the bytes of a 24-bit index.
 #[derive(Debug, Clone)]
 pub struct SobolAxis {
     columns: [u32; 32],
