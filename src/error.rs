@@ -1,6 +1,6 @@
 //! One error type for everything that files and people can get wrong.
 //!
-//! A message reads `place: expected …, found …`; the kind decides the exit code (SPEC §5).
+//! A message reads `place: expected …, found …`; the kind decides the exit code.
 
 use std::fmt;
 use std::path::Path;

@@ -171,7 +171,7 @@ pub fn read_exr(path: &Path) -> Result<(Image, Vec<(String, String)>)> {
     Ok((file.layer_data.channel_data.pixels, provenance))
 }
 
-/// The framework's filmic curve, before normalisation: H(x) of SPEC §2.
+/// The framework's filmic curve, before normalisation: H(x) = (x(Ax+CB)+DE)/(x(Ax+B)+DF) − E/F.
 fn hable(x: f32) -> f32 {
     const A: f32 = 0.15;
     const B: f32 = 0.50;

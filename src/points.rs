@@ -8,11 +8,14 @@ use crate::error::{Error, Result};
 use crate::stats::discrepancy::{L2Kind, STAR_COST_LIMIT, l2_squared, min_toroidal_distance, star, t_value};
 use crate::stats::{Points, PointsError, Side};
 
-/// Every metric of one point set (SPEC §5, `measure`).
+/// Every metric of one point set: what `measure` tells.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Measurement {
     /// Sampler or file.
     pub source: String,
+    /// What the sampler's name stands for, the count asked and the seed; absent for files.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sampler: Option<SamplerSource>,
     /// Number of points.
     pub n: usize,
     /// Number of coordinates.
@@ -26,6 +29,17 @@ pub struct Measurement {
     pub t_value: Option<u32>,
     /// Smallest distance of two points on the torus; null for one point.
     pub min_toroidal_distance: Option<f64>,
+}
+
+/// Where the points of a sampler come from.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SamplerSource {
+    /// The whole name.
+    pub expansion: String,
+    /// Count asked for; `n` is the count taken.
+    pub asked: u32,
+    /// Seed of the randomisation.
+    pub seed: u64,
 }
 
 /// Star discrepancy D*: the largest gap between counted and true measure of boxes at the origin.
@@ -72,6 +86,7 @@ pub fn measure(source: &str, points: &Points) -> Result<Measurement> {
     });
     Ok(Measurement {
         source: source.to_owned(),
+        sampler: None,
         n: points.n(),
         dimension: points.dimension(),
         star: StarValue { value: star.value, exact: true, corner: star.corner, side: star.side },

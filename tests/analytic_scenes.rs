@@ -106,7 +106,7 @@ fn one_area_sample_has_lamberts_mean_and_its_exact_variance() {
 }
 
 /// Lights that are no parallelogram take their triangle from the same 2-D decision: a pentagon, a triangle, and a quadrilateral
-/// whose halves differ. Mean and variance as above; METHODS §9 no. 53: a forgotten square root would be seen. Six tests.
+/// whose halves differ. Mean and variance as above; A forgotten square root would be seen. Six tests.
 #[test]
 fn mesh_lights_have_lamberts_mean_and_the_exact_variance_of_sampling_by_area() {
     let family = Family { tests: 6, false_alarm: 1e-7 };
@@ -135,7 +135,7 @@ fn mesh_lights_have_lamberts_mean_and_the_exact_variance_of_sampling_by_area() {
     }
 }
 
-/// METHODS §9 no. 46: nothing leaks through an absolute value.
+/// Nothing leaks through an absolute value.
 #[test]
 fn a_light_with_its_winding_flipped_gives_exactly_nothing() {
     for (name, light, exact, at, irradiance) in polygon_cases() {
@@ -207,7 +207,7 @@ fn floor_camera() -> CameraConfig {
     looking_at(Vec3::new(0.1, 0.5, -0.4), Vec3::new(0.0, 0.0, 0.0), 40.0)
 }
 
-/// METHODS §9 no. 47 to 49: no acne, no light that shadows itself, no absolute epsilon: every sample sees the light.
+/// No acne, no light that shadows itself, no absolute epsilon: every sample sees the light.
 #[test]
 fn nothing_shadows_an_unoccluded_scene_at_any_scale() {
     for (which, room) in unoccluded_rooms().iter().enumerate() {
@@ -298,7 +298,7 @@ fn a_half_hidden_light_gives_the_irradiance_of_its_visible_half() {
 }
 
 /// The scene's files against its closed form: 36 tiles of 4 × 4 pixels, R = 24 replicates of 256 spp, Student's t on the
-/// tiles' means (per-pixel tests would be badly calibrated where few samples are lit, METHODS §9 no. 33; tiles of which
+/// tiles' means (per-pixel tests would be badly calibrated where few samples are lit; tiles of which
 /// fewer than 100 samples in all are lit are pooled). False-alarm rate 1e-7 for the family.
 #[test]
 fn the_penumbra_scene_is_its_closed_form() {
@@ -503,7 +503,7 @@ fn two_lights_add_up_and_the_sheets_shortcut_errs_as_predicted() {
     }
 }
 
-/// METHODS §9 no. 51: of two lights the one without power is never chosen, it is not even asked about.
+/// Of two lights the one without power is never chosen, it is not even asked about.
 #[test]
 fn a_light_without_power_is_never_chosen() {
     let mut room = Room::default();
@@ -516,7 +516,7 @@ fn a_light_without_power_is_never_chosen() {
     assert_eq!(scene.layout.to_string(), "pixel 0–1, light point 2–3, 4 dimensions in all");
 }
 
-/// METHODS §9 no. 51: powers 10⁻³⁰ beside 10³⁰. Every number that can pick is tried at the ends, among them 0, which
+/// Powers 10⁻³⁰ beside 10³⁰. Every number that can pick is tried at the ends, among them 0, which
 /// unrandomised sets give to every pixel's first sample: each probability is the share of numbers that pick the light, so
 /// the mean is exact and nothing divides by 0.
 #[test]
@@ -552,7 +552,7 @@ fn lights_of_1e_minus_30_and_1e30_stand_side_by_side() {
     }
 }
 
-/// METHODS §9 no. 50: triangles without area among a light's, and a light of nothing else.
+/// Triangles without area among a light's, and a light of nothing else.
 #[test]
 fn a_degenerate_triangle_gives_nothing_and_is_never_chosen() {
     let quad = ceiling(Vec3::new(0.2, 2.0, 0.0), 0.5, 0.5);

@@ -884,7 +884,7 @@ fn the_lab_says_what_is_exact_and_what_is_random() {
     assert!(error.exit_code() == 2 && error.what.contains("nowhere.json"), "{error}");
 }
 
-/// 16 points of the (0,2)-sequence: D* = 11/64, proved in rationals (METHODS §0 point 6); it is a net with t = 0; no two
+/// 16 points of the (0,2)-sequence: D* = 11/64, proved in rationals; it is a net with t = 0; no two
 /// of its points share a row of 1/16, and the sheet's shuffled set is the same set.
 #[test]
 fn every_metric_has_a_value_and_the_known_one_is_right() {

@@ -1,4 +1,4 @@
-//! The noise of every randomised sampler against exact variances (METHODS §5): a slope hides a wrong constant, a closed form
+//! The noise of every randomised sampler against exact variances: a slope hides a wrong constant, a closed form
 //! does not.
 //!
 //! A replicate is the mean of f over one whole randomised set. Its squared errors are averaged over seeds and compared with
@@ -157,7 +157,7 @@ fn the_mean_of_a_coordinate_has_its_exact_variance() {
     }
 }
 
-/// METHODS §0, 2: with x = i/n not randomised, every pixel has mean x = ½ − 1/(2n): a bias, not noise; y has the shift's.
+/// With x = i/n not randomised, every pixel has mean x = ½ − 1/(2n): a bias, not noise; y has the shift's.
 #[test]
 fn an_unrandomised_axis_has_a_bias_and_no_variance() {
     for n in [16u32, 64] {
@@ -263,7 +263,7 @@ fn pair_covariances_give_the_closed_forms_of_nets() {
     }
 }
 
-/// Owen scrambles of counts that are no powers of two (METHODS §9 no. 17), where only the pair sum is exact.
+/// Owen scrambles of counts that are no powers of two, where only the pair sum is exact.
 #[test]
 fn owen_scrambles_of_odd_counts_have_their_exact_variance() {
     for n in [3u32, 12, 24, 48, 100] {
@@ -342,7 +342,7 @@ fn the_explicit_tree_has_the_same_exact_variances() {
     }
 }
 
-/// METHODS §9 no. 19: the factors of `failures_measured.json`, which a slope plot would not show. Our own hash is within the
+/// The factors of `failures_measured.json`, which a slope plot would not show. Our own hash is within the
 /// error of 1 in the same setting; theirs is refused by the test that ours passes.
 #[test]
 fn the_first_published_hash_of_2020_misses_owens_variance() {

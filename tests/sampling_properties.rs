@@ -1,4 +1,4 @@
-//! What every sampler promises, over the whole vocabulary of SPEC §4: ranges, nets, strata, orders, uniformity, and which
+//! What every sampler promises, over the whole vocabulary: ranges, nets, strata, orders, uniformity, and which
 //! decisions march in step.
 //!
 //! Seeds are fixed, so each test always passes or always fails. Each statistical test states its family's false-alarm rate.
@@ -168,7 +168,7 @@ fn whole_sets_are_nets_in_every_decision_also_shuffled() {
     }
 }
 
-/// METHODS §9 no. 21: Cranley and Patterson's shift keeps each axis stratified and breaks the net.
+/// Cranley and Patterson's shift keeps each axis stratified and breaks the net.
 #[test]
 fn a_toroidal_shift_breaks_the_net_but_not_its_axes() {
     for name in ["ld:step:shift", "hammersley:step:shift", "sobol:step:shift"] {
@@ -186,7 +186,7 @@ fn a_toroidal_shift_breaks_the_net_but_not_its_axes() {
     }
 }
 
-/// METHODS §9 no. 12 and 17: a prefix of Hammersley's set reaches only its share of x.
+/// A prefix of Hammersley's set reaches only its share of x.
 #[test]
 fn half_a_hammersley_set_covers_half_of_x() {
     let points = point_set(spec("hammersley:plain"), 64, 0).unwrap();
@@ -282,7 +282,7 @@ fn marginals(s: SamplerSpec) -> Vec<Marginal> {
     all
 }
 
-/// METHODS §7: fix an address, vary the seed. Kolmogorov–Smirnov on the number and on its lower twelve bits, which a wrong
+/// Fix an address, vary the seed. Kolmogorov–Smirnov on the number and on its lower twelve bits, which a wrong
 /// bit order or missing low bits would leave uneven; family-wise false-alarm rate 1e-7 for the file's uniformity tests (at
 /// most 3000). At 1000 seeds a distribution function that is off by 0.15 anywhere is caught.
 const UNIFORMITY: Family = Family { tests: 3000, false_alarm: 1e-7 };
@@ -303,7 +303,7 @@ fn a_fixed_index_is_uniform_over_seeds_where_the_sampler_says_so() {
     assert!(tests > 1000 && tests <= UNIFORMITY.tests, "{tests} tests");
 }
 
-/// The exempt ones, as METHODS §7 names them: fixed points, jitter that stays in its own stratum, the x of `yxor`.
+/// The exempt ones, fixed points, jitter that stays in its own stratum, the x of `yxor`.
 #[test]
 fn a_fixed_index_is_not_uniform_where_the_sampler_says_it_is_not() {
     let fails = |m: &Marginal| !ks_uniform_test(&m.values, UNIFORMITY).holds();
@@ -384,7 +384,7 @@ fn squared_distance(u: [f64; 2], v: [f64; 2]) -> f64 {
     (u[0] - v[0]).powi(2) + (u[1] - v[1]).powi(2)
 }
 
-/// SPEC §4's f = ‖u − v‖² over two decisions, truth 1/3: right for every best preset. 12 tests at 1e-7 together.
+/// f = ‖u − v‖² over two decisions, truth 1/3: right for every best preset. 12 tests at 1e-7 together.
 #[test]
 fn the_best_presets_get_the_distance_of_two_decisions_right() {
     let family = Family { tests: 12, false_alarm: 1e-7 };

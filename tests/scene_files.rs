@@ -1,4 +1,4 @@
-//! Scene files: what is accepted means what SPEC §2 says, and each bad input is an error that names place, expected and found.
+//! Scene files: what is accepted means what its documentation says, and each bad input is an error that names place, expected and found.
 
 use std::path::PathBuf;
 

@@ -29,7 +29,7 @@ impl DiskLight {
     /// normal is opposite to the disk's; exactly 0 for h ≤ 0.
     ///
     /// With q = a² + h² − R² and s = √(q² + 4R²h²): (π/2) k_e (1 − q/s), which cancels for R ≪ h and equals
-    /// 2π k_e R² h² / (s (s + q)), which cancels for q < 0: each is used where nothing cancels (Howell C-21; METHODS §8
+    /// 2π k_e R² h² / (s (s + q)), which cancels for q < 0: each is used where nothing cancels (Howell C-21
     /// writes q = Z − 2R² and s² = Z² − 4R²a²).
     pub fn irradiance(&self, height: f64, offset: f64) -> f64 {
         if height <= 0.0 {

@@ -5,7 +5,7 @@
 //! E = k_e ∫ cos θ cos θ_l / r² dA = (k_e/2) |Σ Θ_i (n · G_i)|,
 //!
 //! with v_i the vectors from the point to the corners, G_i the unit vector of v_i × v_{i+1} and Θ_i the angle between
-//! v_i and v_{i+1} (Lambert 1760; METHODS: Howell's catalogue C-11, C-12 as independent forms).
+//! v_i and v_{i+1} (Lambert 1760; Howell's catalogue C-11, C-12 as independent forms).
 //!
 //! # Numbers
 //!

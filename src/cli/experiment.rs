@@ -52,7 +52,8 @@ impl Run {
         let plan = plan(&experiment, &lab)?;
         self.work.warn(&lab.warnings());
         self.work.warn(&plan.notes);
-        let survey = Survey::new(&plan, &Standing::read(&plan, &out)?, &out, self.work.threads());
+        let standing = if self.fresh { Standing::nothing(&plan) } else { Standing::read(&plan, &out)? };
+        let survey = Survey::new(&plan, &standing, &out, self.work.threads());
         if self.dry_run {
             return if self.json { print_json(&survey_json(&survey)) } else { print(&format!("{survey}\n")) };
         }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use sampler_lab::error::{Error, Result};
 use sampler_lab::film::write_whole;
-use sampler_lab::points::{measure, read_csv, read_csv_file, to_csv};
+use sampler_lab::points::{Measurement, SamplerSource, measure, read_csv, read_csv_file, to_csv};
 use sampler_lab::report::pictures::{SHEET_DOT, SHEET_PANEL, point_set_panel};
 use sampler_lab::sampling::{MAX_SAMPLES, Preset, SamplerSpec, point_set};
 use sampler_lab::stats::Points;
@@ -115,31 +115,33 @@ impl Measure {
     /// Reads or makes the set, and prints every metric.
     pub fn run(self) -> Result<()> {
         self.work.start_threads()?;
-        let points = self.points()?;
-        let measured = measure(&self.source, &points)?;
+        let (points, sampler) = self.points()?;
+        let measured = Measurement { sampler, ..measure(&self.source, &points)? };
         if self.json { print_json(&measured) } else { print(&measured.to_text()) }
     }
 
-    fn points(&self) -> Result<Points> {
+    fn points(&self) -> Result<(Points, Option<SamplerSource>)> {
         let is_file = self.source == "-" || self.source.ends_with(".csv") || Path::new(&self.source).is_file();
         if is_file {
             if let Some(n) = self.n {
                 return Err(Error::input("-n", format!("expected no count with a file, which has its own, found {n}")));
             }
             if self.source != "-" {
-                return read_csv_file(Path::new(&self.source));
+                return Ok((read_csv_file(Path::new(&self.source))?, None));
             }
             let mut text = String::new();
             std::io::stdin()
                 .read_to_string(&mut text)
                 .map_err(|e| Error::input("standard input", format!("expected CSV text, found: {e}")))?;
-            return read_csv(&text, "standard input");
+            return Ok((read_csv(&text, "standard input")?, None));
         }
         let spec = SamplerSpec::parse(&self.source, Preset::Sheet).map_err(|mut e| {
             e.what += &format!("; nor is there a file \"{}\"", self.source);
             e
         })?;
-        let set = point_set(spec, self.n.unwrap_or(1024), self.seed)?;
-        Points::new_2d(&set).map_err(|e| Error::input(&self.source, e))
+        let asked = self.n.unwrap_or(1024);
+        let set = point_set(spec, asked, self.seed)?;
+        let points = Points::new_2d(&set).map_err(|e| Error::input(&self.source, e))?;
+        Ok((points, Some(SamplerSource { expansion: spec.expansion(), asked, seed: self.seed })))
     }
 }

@@ -195,6 +195,15 @@ pub trait Backend {
     /// are asked for; at least `asked`.
     fn taken(&self, canonical: &str, scene: Option<&str>, asked: u32) -> u32;
 
+    /// Whether the sampler has numbers for every decision that the scene makes.
+    ///
+    /// # Errors
+    /// Kind `Input` that names the decision.
+    fn check_sampler(&self, canonical: &str, scene: &str) -> Result<()> {
+        let _ = (canonical, scene);
+        Ok(())
+    }
+
     /// The algorithm numbers behind items of this sampler.
     fn algorithms(&self, canonical: &str) -> Algorithms;
 

@@ -109,13 +109,18 @@ pub fn execute(
     progress: &dyn Progress,
     options: &Options,
 ) -> Result<Outcome> {
+    // What needs more than it may is refused before anything is made.
+    let first_look = if options.fresh { Standing::nothing(plan) } else { Standing::read(plan, out)? };
+    Survey::new(plan, &first_look, out, options.threads).refuse_above(&options.limits, &plan.experiment.place)?;
+    if !options.fresh {
+        refuse_another_experiment(plan, out)?;
+    }
     let _lock = lock(out)?;
     if options.fresh {
         forget(out)?;
     }
     let standing = Standing::read(plan, out)?;
     let survey = Survey::new(plan, &standing, out, options.threads);
-    survey.refuse_above(&options.limits, &plan.experiment.place)?;
     write_about(plan, out, &options.command)?;
     let found = standing.states.iter().filter(|&&state| state == State::Done).count();
     let meter = Meter::new(found, plan.items.len(), survey.samples_left);
@@ -126,6 +131,23 @@ pub fn execute(
     }
     let samples = run.meter.tick().samples_done;
     Ok(Outcome { items: plan.items.len(), found, done, failures: run.failures, interrupted, samples })
+}
+
+/// A folder keeps the results of one experiment: it may grow or change, but another's rows are not put aside for it.
+fn refuse_another_experiment(plan: &Plan, out: &Path) -> Result<()> {
+    let path = results::about_path(out);
+    if !path.exists() {
+        return Ok(());
+    }
+    let (there, wanted) = (results::read_about(&path)?.experiment, &plan.experiment);
+    if (&there.name, there.seed) == (&wanted.name, wanted.seed) {
+        return Ok(());
+    }
+    let what = format!(
+        "expected results of the experiment {:?} with seed {}, found those of {:?} with seed {}; give another --out, or --fresh to do away with them",
+        wanted.name, wanted.seed, there.name, there.seed
+    );
+    Err(Error::input(path.display(), what))
 }
 
 /// Two runs that append to the same files would tear each other's lines. The system lets go of the lock with the process.

@@ -147,9 +147,7 @@ impl Backend for Lab {
     }
 
     fn parse_sampler(&self, text: &str) -> Result<String> {
-        let spec = spec(text)?;
-        // The sheet's presets read 1-D decisions another way, which only their own name says.
-        Ok(if spec.sheet_1d { format!("{}:sheet", spec.points.word()) } else { spec.expansion() })
+        Ok(spec(text)?.to_string())
     }
 
     fn is_random(&self, canonical: &str, scene: Option<&str>) -> bool {
@@ -164,6 +162,11 @@ impl Backend for Lab {
             Some(scene) => self.with(scene, |opened| SamplerSet::from(spec).taken(asked, &opened.layout)),
             None => spec.taken(asked),
         })
+    }
+
+    fn check_sampler(&self, canonical: &str, scene: &str) -> Result<()> {
+        let spec = spec(canonical)?;
+        self.with(scene, |opened| Sampler::new(spec, &opened.layout, 1, 0).map(|_| ()))
     }
 
     fn algorithms(&self, _: &str) -> Algorithms {

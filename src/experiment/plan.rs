@@ -305,6 +305,10 @@ pub fn plan(experiment: &Experiment, backend: &dyn Backend) -> Result<Plan> {
     let scenes = open_scenes(experiment, backend)?;
     let samplers = read_samplers(experiment, backend)?;
     let reference_sampler = read_reference_sampler(experiment, backend, &samplers, &scenes)?;
+    for (scene, sampler) in scenes.iter().flat_map(|scene| samplers.iter().map(move |sampler| (scene, sampler))) {
+        let place = |e: Error| Error::input(format!("{}: samplers: scene {}", experiment.place, scene.name), e);
+        backend.check_sampler(&sampler.canonical, &scene.name).map_err(place)?;
+    }
     check_metrics(experiment, backend)?;
     let mut planner = Planner {
         experiment,

@@ -81,7 +81,7 @@ pub struct Count {
     pub taken: u32,
 }
 
-/// Errors of one image against its reference (METHODS §6), over pixel-channels.
+/// Errors of one image against its reference over pixel-channels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ImageErrors {
     /// Id of the reference.

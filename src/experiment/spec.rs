@@ -9,7 +9,7 @@
 //! | `seed` | whole number of 64 bits; every randomisation is derived from it |
 //! | `scenes` | names of scene files in `configs/`, or paths that end in `.json` |
 //! | `size` | optional: `"WxH"` for all scenes, or `{"SCENE": "WxH"}`; a scene not named keeps its file's own |
-//! | `samplers` | texts `POINTS[:ORDER[:RANDOM[@SCOPE]]]` or `POINTS:PRESET`; a bare name means `:best` |
+//! | `samplers` | texts `POINTS[:ORDER[:RANDOM[@SCOPE]]]` or `POINTS:PRESET`, or objects `{"points", "order", "random", "scope"}`; a bare name means `:best` |
 //! | `spp` | samples per pixel, each 1 to 2^24 |
 //! | `replicates` | independent randomisations of each image; 1 is used where nothing is random |
 //! | `reference` | `{"sampler", "spp"}`: two independent halves of `spp` samples per pixel, by a randomised sampler that is not compared |
@@ -138,7 +138,7 @@ impl Experiment {
         let seed = fields.need("seed", |item| item.integer(0..=u64::MAX))?;
         let scenes = fields.need("scenes", |item| texts(&item, "scene names"))?;
         let size = fields.or("size", Sizes::PerScene(BTreeMap::new()), |item| sizes(&item, &scenes))?;
-        let samplers = fields.need("samplers", |item| texts(&item, "samplers"))?;
+        let samplers = fields.need("samplers", |item| list(&item, "samplers", sampler))?;
         let spp = fields.need("spp", |item| counts(&item, MOST_SPP))?;
         let replicates = fields.need("replicates", |item| count(&item, MOST_REPLICATES))?;
         let reference = fields.need("reference", |item| reference(&item))?;
@@ -208,6 +208,35 @@ fn texts(item: &Item, what: &str) -> Result<Vec<String>> {
         "" => Err(item.unexpected("a text that is not empty")),
         text => Ok(text.to_owned()),
     })
+}
+
+/// A sampler as text, or as `{"points", "order", "random", "scope"}`, of which later ones may be left out.
+fn sampler(item: &Item) -> Result<String> {
+    if !matches!(item.value, Value::Object(_)) {
+        return match item.text("a sampler: a text, or an object with points, order, random and scope")? {
+            "" => Err(item.unexpected("a text that is not empty")),
+            text => Ok(text.to_owned()),
+        };
+    }
+    let mut fields = item.fields()?;
+    let word = |item: Item| item.text("a word").map(str::to_owned);
+    let mut text = fields.need("points", word)?;
+    let [order, random, scope] = ["order", "random", "scope"].map(|key| fields.opt(key, word));
+    let (order, random, scope) = (order?, random?, scope?);
+    fields.finish()?;
+    let missing = |key: &str| item.unexpected(format!("\"{key}\" where a later part is given"));
+    match (&order, &random, &scope) {
+        (None, Some(_), _) | (None, _, Some(_)) => return Err(missing("order")),
+        (_, None, Some(_)) => return Err(missing("random")),
+        _ => {}
+    }
+    for (sign, part) in [(':', order), (':', random), ('@', scope)] {
+        if let Some(part) = part {
+            text.push(sign);
+            text.push_str(&part);
+        }
+    }
+    Ok(text)
 }
 
 /// A number of things, at least 1.
@@ -342,7 +371,13 @@ mod tests {
         ("\"6x4\"", "\"6x0\"", "size.box: expected a size such as"),
         ("\"6x4\"", "64", "size.box: expected a size such as"),
         ("{\"box\": \"6x4\"}", "12", "size: expected a size such as"),
-        ("\"ld:sheet\"", "{\"name\": \"x\"}", "samplers[1]: expected a text, found {\"name\": \"x\"}"),
+        ("\"ld:sheet\"", "{\"name\": \"x\"}", "samplers[1].points"),
+        (
+            "\"ld:sheet\"",
+            "{\"points\": \"ld\", \"random\": \"owen\"}",
+            "samplers[1]: expected \"order\" where a later part is given",
+        ),
+        ("\"ld:sheet\"", "{\"points\": \"ld\", \"ordr\": \"step\"}", "did you mean \"order\""),
         ("\"ld:sheet\"", "\"uniform\"", "samplers[1]: expected each entry once"),
         ("\"ld:sheet\"", "\"\"", "samplers[1]: expected a text that is not empty"),
         ("[1, 4]", "[1, 0]", "spp[1]: expected a whole number from 1 to 16777216, found 0"),

@@ -55,6 +55,12 @@ pub struct Standing {
 }
 
 impl Standing {
+    /// Nothing done, whatever a folder holds.
+    pub fn nothing(plan: &Plan) -> Self {
+        let states = vec![State::Missing; plan.items.len()];
+        Self { rows: HashMap::new(), in_file: Vec::new(), timings: HashMap::new(), states, is_clean: true }
+    }
+
     /// Reads an output folder; one that is not there has nothing done.
     ///
     /// # Errors

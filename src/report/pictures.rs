@@ -137,6 +137,9 @@ pub fn strip(cells: &[StripCell], layout: &StripLayout) -> Result<Rgb8> {
     Ok(Grid::new(cells, layout).drawn(cells))
 }
 
+/// White around a strip, in pixels of the page.
+const MARGIN: f64 = 10.0;
+
 /// Longest edge of a strip, in pixels: 3.2 GB at worst while letters are painted, and far more than any page shows.
 const LONGEST: u64 = 16_384;
 
@@ -216,19 +219,19 @@ impl<'a> Grid<'a> {
 
     fn drawn(&self, cells: &[StripCell]) -> Rgb8 {
         let rows = (cells.len() as u32).div_ceil(self.columns);
-        let gap = self.pixels(GAP);
+        let (gap, margin) = (self.pixels(GAP), self.pixels(MARGIN));
         let foot = if self.layout.scale_bar.is_some() { self.pixels(46.0) } else { 0 };
-        let width = self.columns * self.cell_width() + (self.columns - 1) * gap;
-        let mut raster = Rgb8::filled(width, (rows * self.cell_height() + foot).max(1), WHITE);
+        let width = self.columns * self.cell_width() + (self.columns - 1) * gap + 2 * margin;
+        let mut raster = Rgb8::filled(width, rows * self.cell_height() + foot + 2 * margin, WHITE);
         let mut texts = Drawing::new(0.0, 0.0);
         for (i, cell) in cells.iter().enumerate() {
-            let left = i as u32 % self.columns * (self.cell_width() + gap);
-            let top = i as u32 / self.columns * self.cell_height();
+            let left = margin + i as u32 % self.columns * (self.cell_width() + gap);
+            let top = margin + i as u32 / self.columns * self.cell_height();
             self.draw_images(&mut raster, cell, left, top + self.pixels(TITLE_STEP));
             self.write_texts(&mut texts, cell, &self.captions[i], (left, top));
         }
         if let Some(bar) = &self.layout.scale_bar {
-            self.draw_bar(&mut raster, &mut texts, bar, rows * self.cell_height());
+            self.draw_bar(&mut raster, &mut texts, bar, margin + rows * self.cell_height());
         }
         raster.annotate(&texts.marks, self.scale);
         raster

@@ -418,7 +418,7 @@ mod tests {
         "hammersley:plain",
         "ld:sheet",
         "sobol",
-        "a name far longer than any sampler that SPEC §4 can spell, cut with an ellipsis",
+        "a name far longer than any sampler that the vocabulary can spell, cut with an ellipsis",
         "blue noise",
     ];
 

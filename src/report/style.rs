@@ -51,7 +51,7 @@ pub struct Style {
 
 /// The look of the sampler `name`, the same in every figure: colour and shape belong to the points before the first
 /// colon; `:best` (and a bare name) is solid and filled, `:sheet` dashed and hollow, `:plain` dotted and hollow, any
-/// other description dash-dotted and filled. Names outside SPEC §4 share purple and a shape that hashes the name.
+/// other description dash-dotted and filled. Names of no known point set share purple and a shape that hashes the name.
 pub fn style_of(name: &str) -> Style {
     let (family, preset) = name.split_once(':').unwrap_or((name, ""));
     let (colour, marker) = match family {
@@ -70,6 +70,8 @@ pub fn style_of(name: &str) -> Style {
         "plain" => (Dash::Dotted, false),
         _ => (Dash::DashDot, true),
     };
+    // A description in full is a variant beside the presets: the same shape, the colour mixed with black.
+    let colour = if dash == Dash::DashDot { colour.map(|c: u8| (f64::from(c) * 0.55) as u8) } else { colour };
     Style { colour, marker, filled, dash }
 }
 

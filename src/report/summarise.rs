@@ -12,7 +12,7 @@ use crate::stats::{Estimate, SlopeFit, slope_with_interval, t_interval};
 
 use super::evidence::{Course, ratio, ratio_of_roots};
 
-/// Counts that a slope of RMSE is fitted over: powers of two from 4 to 256 that the sampler takes as asked (METHODS §5).
+/// Counts that a slope of RMSE is fitted over: powers of two from 4 to 256 that the sampler takes as asked.
 pub const SLOPE_COUNTS: std::ops::RangeInclusive<u32> = 4..=256;
 
 /// Smallest set that a slope of the star discrepancy is fitted over.
@@ -321,7 +321,7 @@ fn label(names: &[String]) -> String {
     let family = |name: &str| name.split(':').next().unwrap_or(name).to_owned();
     match names {
         [one] if one.contains(':') || one == "center" => one.clone(),
-        // What a bare name stood for (SPEC §4).
+        // What a bare name stood for.
         [one] => format!("{one}:best"),
         _ if names.iter().all(|name| family(name) == family(&names[0])) => family(&names[0]),
         _ => names.join(" = "),

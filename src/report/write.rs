@@ -66,6 +66,11 @@ impl Written {
     }
 }
 
+/// The names of the enlarged details, left to right, a line each.
+fn details_path(dir: &Path) -> PathBuf {
+    dir.join("figures").join("details.txt")
+}
+
 /// Writes `report.md`, `summary.csv`, `slopes.csv` and `figures/` from the rows in `dir`.
 ///
 /// The same rows, timings and images give the same bytes; `summary.csv` and `slopes.csv` depend on rows alone.
@@ -112,11 +117,15 @@ fn draw(dir: &Path, summary: &Summary) -> Result<Figures> {
                 }
                 pen.raster("errors", Ok(strips.errors))?;
                 pen.figures.details = strips.names.into_iter().map(str::to_owned).collect();
+                write_whole(&details_path(dir), (pen.figures.details.join("\n") + "\n").as_bytes())?;
             }
             Err(e) => {
                 for name in ["reference", "details", "errors"] {
                     pen.raster(name, Err(e.to_string()))?;
                 }
+                // What the kept strips show was found in images that are not here: it was written down beside them.
+                let names = std::fs::read_to_string(details_path(dir)).unwrap_or_default();
+                pen.figures.details = names.lines().map(str::to_owned).collect();
             }
         }
     }

@@ -98,7 +98,7 @@ mod tests {
         assert_eq!((digit_count(3, 1), digit_count(3, 9), digit_count(3, 10)), (0, 2, 3));
     }
 
-    /// METHODS §9 no. 1: single-precision digit arithmetic reaches 1.0 at bᵏ − 1; integers do not.
+    /// Single-precision digit arithmetic reaches 1.0 at bᵏ − 1; integers do not.
     #[test]
     fn no_index_below_two_to_the_24_reaches_one() {
         for base in PRIMES {

@@ -80,7 +80,7 @@ impl LoadedScene {
 /// Reads the scene file at `config_path` and everything it refers to.
 ///
 /// # Errors
-/// Kind `Input` naming the file and its line or key, what was expected and what was found: see SPEC §2 for the list.
+/// Kind `Input` naming the file and its line or key, what was expected and what was found: `tests/scene_files.rs` has each.
 pub fn open(config_path: &Path, options: &OpenOptions) -> Result<LoadedScene> {
     let mut inputs = Inputs::default();
     let bytes =

@@ -1,6 +1,6 @@
 //! The answer box: at most eight lines that answer the sheet's questions.
 
-use crate::sampling::{Points, Preset};
+use crate::sampling::{Order, Points, Preset};
 
 use super::super::evidence::{Answer, Limit, below};
 use super::super::markdown::{Page, link_to};
@@ -221,7 +221,9 @@ fn hurts(summary: &Summary) -> Option<String> {
         .max_by(|a, b| a.3.value.total_cmp(&b.3.value));
     let alike = (0..summary.scenes.len())
         .flat_map(|scene| patterns(summary, scene).into_iter().map(move |p| (scene, p)))
+        // Decisions in step bias an image, which makes neighbours alike, too: the pattern alone is shown by the others.
         .filter(|(_, p)| p.errs_alike() == Answer::Yes && !p.cell.is_fixed)
+        .filter(|(_, p)| summary.samplers[p.sampler].spec.is_some_and(|spec| spec.order != Order::Step))
         .filter_map(|(scene, p)| Some((scene, p.cell, p.cell.error_autocorrelation?)))
         .max_by(|a, b| a.2.value.total_cmp(&b.2.value));
     let mut parts = Vec::new();
@@ -229,7 +231,7 @@ fn hurts(summary: &Summary) -> Option<String> {
         let most = summary.most_spp()?;
         let ids = rows(&[summary.cell(scene, sheet, most)?, summary.cell(scene, best, most)?]);
         let words = match against_one(&ratio) {
-            "more" => "Between decisions it hurts",
+            "more" => "Between decisions it can hurt",
             "less" => "Between decisions it does not hurt here",
             _ => "Whether it hurts between decisions cannot be told",
         };

@@ -106,8 +106,8 @@ pub fn bias_and_variance(summary: &Summary, figures: &Figures, page: &mut Page) 
     page.heading(2, titles::BIAS);
     let Some(most) = summary.most_spp() else { return };
     let caption = format!(
-        "Bias² and variance at {most} spp with 95 % intervals; what reaches the left edge is not told apart from 0. More samples cure variance that falls; \
-         nothing but another sampler cures bias."
+        "Bias² and variance at {most} spp with 95 % intervals; what reaches the left edge is not told apart from 0. What each does as samples are \
+         added is in the tables of \"Between decisions\"."
     );
     show(page, figures, "bias-and-variance", true, &caption);
     let lines: Vec<Vec<String>> = (0..summary.scenes.len())
@@ -121,7 +121,7 @@ pub fn bias_and_variance(summary: &Summary, figures: &Figures, page: &mut Page) 
                 estimate(&cell.bias2),
                 variance,
                 estimate(&cell.mse),
-                cell.bias_share().map_or("–".to_owned(), |share| percent(share.clamp(0.0, 1.0))),
+                cell.bias_share().map_or("–".to_owned(), |share| percent(share)),
                 replicates(cell),
                 row(&cell.id),
             ])

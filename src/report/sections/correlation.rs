@@ -131,7 +131,7 @@ fn course_row(summary: &Summary, scene: usize, sampler: usize, from: u32, to: u3
         estimate_cell(high.rmse),
         ratio_cell(course.map(|course| course.rmse_ratio)),
         estimate(&high.bias2),
-        high.bias_share().map_or("–".to_owned(), |share| percent(share.clamp(0.0, 1.0))),
+        high.bias_share().map_or("–".to_owned(), |share| percent(share)),
         if high.is_fixed { "nothing random".to_owned() } else { ratio_cell(variance) },
         course.map_or("cannot tell", |course| limit_words(&course)).to_owned(),
         row(&high.id),

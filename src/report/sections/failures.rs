@@ -242,7 +242,7 @@ pub fn limits(summary: &Summary, page: &mut Page) {
         1 => "One replicate: no variance, and no interval that holds a sampler's own randomness.".to_owned(),
         n => format!(
             "{n} replicates: an interval's own width is good to about {} (relative standard error of a variance √(2/(R − 1)), halved for a width); \
-             with so many intervals in this report some miss their truth by chance, one in twenty by design. The verdicts on bias and on odd counts ask for twice the distance for that reason.",
+             with so many intervals in this report some miss their truth by chance, one in twenty by design. The verdicts \"biased\" and \"worse than promised\" ask for twice the distance for that reason.",
             percent((2.0 / (f64::from(n) - 1.0)).sqrt() / 2.0)
         ),
     });

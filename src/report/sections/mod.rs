@@ -1,4 +1,4 @@
-//! The report's text, section by section, in the order of SPEC §7.
+//! The report's text, section by section, in the order of the page.
 //!
 //! A sentence that asserts something is made by a function of numbers, with other words for the other outcome and for
 //! "cannot tell": the same functions write true sentences about another experiment.
@@ -64,10 +64,8 @@ fn show(page: &mut Page, figures: &Figures, name: &str, is_chart: bool, caption:
     let also = if is_chart { format!(" ([PNG](figures/{name}.png))") } else { String::new() };
     let image = format!("![{}](figures/{name}.{ending})", caption.replace(['[', ']', '`'], ""));
     match figures.state(name) {
-        FigureState::Drawn => page.paragraph(&format!("{image}\n\n*{caption}*{also}")),
-        FigureState::Kept => page.paragraph(&format!(
-            "{image}\n\n*{caption}*{also} The images are not in this folder: the picture is that of the run that made them."
-        )),
+        // A kept figure is that of the run that made the rows: the same text, with or without the images at hand.
+        FigureState::Drawn | FigureState::Kept => page.paragraph(&format!("{image}\n\n*{caption}*{also}")),
         FigureState::Absent(why) => page.paragraph(&format!("*Not shown: {name}. {}*", sentence(&why))),
     }
 }

@@ -95,7 +95,7 @@ pub fn how_to_read(summary: &Summary, page: &mut Page) {
             summary.course_counts().map_or("two counts".to_owned(), |(a, b)| format!("{a} with {b} spp"))
         ),
         "`:sheet` is the exercise sheet read literally: every decision (pixel, lens, light) walks through the same set in the same \
-         order. `:best` keeps the decisions apart. Correlation ρ between neighbouring pixels' errors: 0 for independent pixels, 1 where \
+         order. `:best` keeps the decisions apart. Correlation ρ between neighbouring pixels' errors: 0 for independent unbiased pixels, above 0 where an error is shared (one pattern in all pixels, or a bias that varies slowly over the picture), 1 where \
          all err alike."
             .to_owned(),
         format!("Seeds of all randomisations are derived from {} and stand in the rows.", e.seed),

@@ -1,6 +1,6 @@
 //! The point sets themselves: the sheet's Figure 2, discrepancy, and how even each set is.
 
-use crate::stats::{Estimate, SlopeFit, slope_with_interval};
+use crate::stats::{Estimate, IntervalKind, SlopeFit, slope_with_interval};
 
 use super::super::charts::FIGURE_2_POINTS;
 use super::super::evidence::{Answer, below, ratio};
@@ -81,7 +81,10 @@ pub fn discrepancy(summary: &Summary, figures: &Figures, page: &mut Page) {
             set.and_then(|set| set.mean).map_or("–".to_owned(), |mean| estimate(&mean))
         }));
         let fit = star_slope(summary, sampler);
-        cells.push(fit.as_ref().map_or("–".to_owned(), |fit| signed_estimate(&slope_estimate(fit))));
+        cells.push(fit.as_ref().map_or("–".to_owned(), |fit| {
+            let star = if fit.interval == IntervalKind::Residuals { "*" } else { "" };
+            signed_estimate(&slope_estimate(fit)) + star
+        }));
         cells.push(fit.map_or("0".to_owned(), |fit| fit.points.to_string()));
         cells
     };

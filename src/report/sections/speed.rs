@@ -26,7 +26,7 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
     page.paragraph(&format!(
         "Seconds are this machine's: {} timed on {} threads, wall seconds of rendering alone. Other work on the machine \
          moves them; they are no part of `summary.csv`. Seconds and rates below: median and range. Efficiency 1/(MSE · T) is in 1/(radiance² · thread-seconds), its interval from the \
-         range of T and the 95 % interval of the MSE. RMSE at equal seconds: what uniform sampling takes at its middle count, between the neighbouring counts of each \
+         range of T and the 95 % interval of the MSE. RMSE at equal seconds: what uniform sampling takes at the count of the tables, between the neighbouring counts of each \
          sampler on a straight line of logarithms, values and interval ends alike; the spread of the seconds is not in those intervals.",
         counted(images, "image", "images"),
         listed(&threads)
