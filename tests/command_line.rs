@@ -544,9 +544,11 @@ fn a_sampler_and_the_file_that_points_wrote_of_it_measure_alike() {
     let folder = Folder::empty();
     folder.run(&["points", "halton", "-n", "64"]).fine();
     let mut of_file = folder.run(&["measure", "halton.csv", "--json"]).json();
-    let of_sampler = folder.run(&["measure", "halton", "-n", "64", "--json", "--threads", "1"]).json();
+    let mut of_sampler = folder.run(&["measure", "halton", "-n", "64", "--json", "--threads", "1"]).json();
     assert_is_measurement(&of_sampler, "halton", 64, 2);
     assert!((of_sampler["star"]["value"].as_f64().unwrap() - 5.0 / 96.0).abs() < 1e-14);
+    let sampler = of_sampler.as_object_mut().unwrap().remove("sampler").unwrap();
+    assert_eq!((&sampler["asked"], &sampler["seed"]), (&64.into(), &1.into()));
     of_file["source"] = of_sampler["source"].clone();
     assert_eq!(of_file, of_sampler);
 }
@@ -776,6 +778,31 @@ fn the_smoke_experiment_runs_and_a_second_run_does_nothing() {
     assert_same(&files(&folder.path("out")), &before);
     folder.run(&["report", "out"]).fine();
     assert_same(&files(&folder.path("out")), &before);
+
+    // Pictures are not in a clone: the report is the same without them.
+    std::fs::rename(folder.path("out/images"), folder.path("images")).unwrap();
+    folder.run(&["report", "out"]).fine();
+    std::fs::rename(folder.path("images"), folder.path("out/images")).unwrap();
+    assert_same(&files(&folder.path("out")), &before);
+
+    // Another experiment's results are not put aside, nor is anything made for one that cannot be.
+    let text = std::fs::read_to_string(&smoke).unwrap();
+    std::fs::write(
+        folder.path("other.json"),
+        text.replace("\"smoke\"", "\"other\"")
+            .replace("\"cornell\"", &format!("{:?}", repository("configs/cornell.json"))),
+    )
+    .unwrap();
+    folder
+        .run(&["run", "other.json", "--out", "out"])
+        .refused(2, &["experiment.json", "\"other\"", "\"smoke\"", "--fresh"]);
+    assert_same(&files(&folder.path("out")), &before);
+    let center = text
+        .replace("\"halton:plain\"", "\"center\"")
+        .replace("\"cornell\"", &format!("{:?}", repository("configs/cornell.json")));
+    std::fs::write(folder.path("center.json"), center).unwrap();
+    folder.run(&["run", "center.json", "--out", "new"]).refused(2, &["center", "light point"]);
+    assert!(!folder.path("new").exists());
 
     // A picture's row is lost: what exists is reported, and the next run makes up for it.
     let is_picture = |row: &String| row.contains(r#""kind":"picture""#);

@@ -227,7 +227,10 @@ fn pictures_without_images_are_said_to_be_missing_and_an_earlier_figure_is_kept(
     assert!(text.contains("Missing: 4 of 5 pictures; 4 of 4 stages of Figure 1"), "{text}");
     assert!(text.contains("*Not shown: errors."));
     std::fs::write(folder.path().join("figures/errors.png"), b"an earlier figure").unwrap();
-    assert!(report(&folder).contains("the picture is that of the run that made them"));
+    assert!(
+        report(&folder).contains("](figures/errors.png)"),
+        "the earlier figure is shown, and the text is that of its run"
+    );
     assert_eq!(std::fs::read(folder.path().join("figures/errors.png")).unwrap(), b"an earlier figure");
 }
 

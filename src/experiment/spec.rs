@@ -350,7 +350,7 @@ mod tests {
     }
 
     /// Each edit of a good file, and what the message has to say of it.
-    const BAD: [(&str, &str, &str); 27] = [
+    const BAD: [(&str, &str, &str); 29] = [
         ("\"seed\"", "\"sede\"", "expected the key \"seed\""),
         ("\"points\"", "\"pionts\"", "pionts: expected one of the keys"),
         ("\"points\"", "\"pionts\"", "did you mean \"points\"?"),
@@ -371,7 +371,7 @@ mod tests {
         ("\"6x4\"", "\"6x0\"", "size.box: expected a size such as"),
         ("\"6x4\"", "64", "size.box: expected a size such as"),
         ("{\"box\": \"6x4\"}", "12", "size: expected a size such as"),
-        ("\"ld:sheet\"", "{\"name\": \"x\"}", "samplers[1].points"),
+        ("\"ld:sheet\"", "{\"name\": \"x\"}", "samplers[1]: expected the key \"points\""),
         (
             "\"ld:sheet\"",
             "{\"points\": \"ld\", \"random\": \"owen\"}",

@@ -433,14 +433,14 @@ mod tests {
         let layout = StripLayout { columns: 1, whole: Some(4), crops: vec![crop], scale_bar: None };
         let cell = StripCell { image: &image, title: "ld:best".into(), captions: vec!["RMSE 0.01".into()] };
         let strip = strip(&[cell], &layout).unwrap();
-        let top = TITLE_STEP as u32;
-        assert_eq!(strip.width, 40);
-        assert_eq!(strip.pixel(0, top), [10, 20, 30]);
-        assert_eq!(strip.pixel(13, top + 9), [200, 100, 50]);
-        assert_eq!(strip.pixel(8, top + 3), [255, 0, 0], "outline above the crop");
+        let (left, top) = (MARGIN as u32, (MARGIN + TITLE_STEP) as u32);
+        assert_eq!(strip.width, 40 + 2 * left);
+        assert_eq!(strip.pixel(left, top), [10, 20, 30]);
+        assert_eq!(strip.pixel(left + 13, top + 9), [200, 100, 50]);
+        assert_eq!(strip.pixel(left + 8, top + 3), [255, 0, 0], "outline above the crop");
         let below = top + 24 + 6;
-        assert_eq!(strip.pixel(15, below + 15), [200, 100, 50]);
-        assert_eq!(strip.pixel(0, below), [255, 0, 0]);
+        assert_eq!(strip.pixel(left + 15, below + 15), [200, 100, 50]);
+        assert_eq!(strip.pixel(left, below), [255, 0, 0]);
     }
 
     #[test]

@@ -139,10 +139,12 @@ mod tests {
     }
 
     #[test]
-    fn presets_share_the_family_s_colour_and_differ_in_dash() {
+    fn presets_share_the_family_s_colour_and_differ_in_dash_and_a_description_in_full_is_darker() {
         let [sheet, best, plain, long] =
             ["halton:sheet", "halton:best", "halton:plain", "halton:joint:digits@each"].map(style_of);
-        assert!([best, plain, long].iter().all(|s| s.colour == sheet.colour && s.marker == sheet.marker));
+        assert!([best, plain].iter().all(|s| s.colour == sheet.colour && s.marker == sheet.marker));
+        assert_eq!(long.marker, sheet.marker);
+        assert!((0..3).all(|c| long.colour[c] < sheet.colour[c]));
         assert_eq!((sheet.dash, sheet.filled), (Dash::Dashed, false));
         assert_eq!((best.dash, best.filled), (Dash::Solid, true));
         assert_eq!((plain.dash, long.dash), (Dash::Dotted, Dash::DashDot));

@@ -117,15 +117,18 @@ fn draw(dir: &Path, summary: &Summary) -> Result<Figures> {
                 }
                 pen.raster("errors", Ok(strips.errors))?;
                 pen.figures.details = strips.names.into_iter().map(str::to_owned).collect();
-                write_whole(&details_path(dir), (pen.figures.details.join("\n") + "\n").as_bytes())?;
+                write_whole(&details_path(dir), pen.figures.details.join("\n").as_bytes())?;
             }
             Err(e) => {
-                for name in ["reference", "details", "errors"] {
+                // What the kept strips show was found in images that are not here: it was written down beside them.
+                let names = std::fs::read_to_string(details_path(dir)).ok();
+                let had_none = names.as_ref().is_some_and(|names| names.trim().is_empty());
+                for name in
+                    ["reference", "details", "errors"].into_iter().filter(|&name| !(had_none && name == "details"))
+                {
                     pen.raster(name, Err(e.to_string()))?;
                 }
-                // What the kept strips show was found in images that are not here: it was written down beside them.
-                let names = std::fs::read_to_string(details_path(dir)).unwrap_or_default();
-                pen.figures.details = names.lines().map(str::to_owned).collect();
+                pen.figures.details = names.unwrap_or_default().lines().map(str::to_owned).collect();
             }
         }
     }

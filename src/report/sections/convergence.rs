@@ -121,7 +121,7 @@ pub fn bias_and_variance(summary: &Summary, figures: &Figures, page: &mut Page) 
                 estimate(&cell.bias2),
                 variance,
                 estimate(&cell.mse),
-                cell.bias_share().map_or("–".to_owned(), |share| percent(share)),
+                cell.bias_share().map_or("–".to_owned(), percent),
                 replicates(cell),
                 row(&cell.id),
             ])

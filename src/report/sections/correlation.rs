@@ -117,6 +117,7 @@ fn scene_block(summary: &Summary, scene: usize, pairs: &[(usize, usize)], page: 
     let items: Vec<String> =
         pairs.iter().filter_map(|&(sheet, best)| literal_sentence(summary, scene, sheet, best)).collect();
     page.bullets(&items);
+    page.sentences(&[shuffle_sentence(summary, scene, pairs).unwrap_or_default()]);
     if let Some(uniform) = summary.uniform() {
         page.sentences(&[control_sentence(summary, scene, uniform).unwrap_or_default()]);
     }
@@ -131,7 +132,7 @@ fn course_row(summary: &Summary, scene: usize, sampler: usize, from: u32, to: u3
         estimate_cell(high.rmse),
         ratio_cell(course.map(|course| course.rmse_ratio)),
         estimate(&high.bias2),
-        high.bias_share().map_or("–".to_owned(), |share| percent(share)),
+        high.bias_share().map_or("–".to_owned(), percent),
         if high.is_fixed { "nothing random".to_owned() } else { ratio_cell(variance) },
         course.map_or("cannot tell", |course| limit_words(&course)).to_owned(),
         row(&high.id),
@@ -192,6 +193,32 @@ fn cure_words(literal: &Cell, cured: &Cell, best_name: &str) -> String {
             times(&gain)
         ),
     }
+}
+
+/// Which wrong limits and stalls shuffling alone cures: the cure reads the same set, in an order of its own for each decision.
+fn shuffle_sentence(summary: &Summary, scene: usize, pairs: &[(usize, usize)]) -> Option<String> {
+    let limit = |sampler: usize| summary.course(scene, sampler).map(|course| course.limit());
+    let shuffled =
+        |&&(_, best): &&(usize, usize)| summary.samplers[best].spec.is_some_and(|s| s.order == Order::Shuffle);
+    let cured = |wanted: Limit| -> Vec<String> {
+        let is_cured = |&&(sheet, best): &&(usize, usize)| {
+            let unbiased = summary.course(scene, best).is_some_and(|course| course.is_biased() == Answer::No);
+            limit(sheet) == Some(wanted) && limit(best) == Some(Limit::Falls) && unbiased
+        };
+        pairs.iter().filter(shuffled).filter(is_cured).map(|&(_, best)| name(summary, best)).collect()
+    };
+    let parts: Vec<String> = [(Limit::Wrong, "the wrong limit"), (Limit::Stalls, "the stall")]
+        .into_iter()
+        .map(|(wanted, words)| (cured(wanted), words))
+        .filter(|(best, _)| !best.is_empty())
+        .map(|(best, words)| format!("{words} (under {} the error falls and no bias is seen)", listed(&best)))
+        .collect();
+    (!parts.is_empty()).then(|| {
+        format!(
+            "**Shuffling cures {}**: the same points, in an order of its own for each decision.",
+            parts.join(" and ")
+        )
+    })
 }
 
 /// Uniform sampling as the control: its decisions are independent however they march.

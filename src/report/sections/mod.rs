@@ -73,7 +73,10 @@ fn show(page: &mut Page, figures: &Figures, name: &str, is_chart: bool, caption:
 /// `why` as a sentence.
 fn sentence(why: &str) -> String {
     let mut letters = why.chars();
-    let first: String = letters.next().into_iter().flat_map(char::to_uppercase).collect();
+    // A path keeps its letters.
+    let is_path = why.split_whitespace().next().is_some_and(|word| word.contains('/'));
+    let raise = |c: char| if is_path { c.to_string() } else { c.to_uppercase().to_string() };
+    let first: String = letters.next().into_iter().map(raise).collect();
     let text = format!("{first}{}", letters.as_str());
     if text.ends_with('.') { text } else { format!("{text}.") }
 }

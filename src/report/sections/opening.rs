@@ -80,7 +80,7 @@ pub fn how_to_read(summary: &Summary, page: &mut Page) {
             .to_owned(),
         "RMSE: root mean square error over pixels and channels in linear radiance, freed of the reference's noise; so an \
          estimate may come out below 0, and is not clipped. MSE = bias² + variance: bias² is what all replicates have in \
-         common and no averaging removes, variance what differs between them."
+         common and no averaging of them removes, variance what differs between them."
             .to_owned(),
         format!(
             "Slope: of log RMSE against log spp by least squares over powers of two from {low} to {high} that the sampler takes as \
