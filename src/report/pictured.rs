@@ -130,6 +130,8 @@ pub struct Strips {
     pub details: Option<Rgb8>,
     /// Signed errors of every picture.
     pub errors: Rgb8,
+    /// The pictures themselves, by file name without ending.
+    pub whole_pictures: Vec<(String, Rgb8)>,
     /// The details, left to right.
     pub names: Vec<&'static str>,
 }
@@ -154,7 +156,19 @@ pub fn strips(dir: &Path, summary: &Summary) -> Result<Strips> {
         details: (!crops.is_empty()).then(|| detail_strip(summary, &title, &reference, &images, &crops)).transpose()?,
         errors: error_strip(summary, &reference, &images)?,
         names: details.iter().map(|detail| detail.name).collect(),
+        whole_pictures: whole_pictures(summary, whole_shown, &images),
     })
+}
+
+/// The reference and each picture as shown, named in the order of the table, for an image viewer to flip through.
+fn whole_pictures(summary: &Summary, reference: Rgb8, images: &[Image]) -> Vec<(String, Rgb8)> {
+    let label = |i: usize| {
+        let canonical = &summary.pictures[i].sampler;
+        let label = summary.samplers.iter().find(|s| s.canonical == *canonical).map_or(canonical, |s| &s.label);
+        format!("{:02}-{}", i + 1, label.replace([':', '@'], "-"))
+    };
+    let pictures = images.iter().enumerate().map(|(i, image)| (label(i), shown(image)));
+    std::iter::once(("00-reference".to_owned(), reference)).chain(pictures).collect()
 }
 
 /// Under each picture: its error.

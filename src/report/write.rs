@@ -117,6 +117,10 @@ fn draw(dir: &Path, summary: &Summary) -> Result<Figures> {
                 }
                 pen.raster("errors", Ok(strips.errors))?;
                 pen.figures.details = strips.names.into_iter().map(str::to_owned).collect();
+                // Too large for a repository: they lie with the images.
+                for (name, picture) in strips.whole_pictures {
+                    picture.write(&dir.join("images").join("flip").join(format!("{name}.png")))?;
+                }
                 write_whole(&details_path(dir), pen.figures.details.join("\n").as_bytes())?;
             }
             Err(e) => {

@@ -81,5 +81,6 @@ pub fn strips(summary: &Summary, figures: &Figures, page: &mut Page) {
         })
         .collect();
     page.table(&["picture", "spp taken", "RMSE", "ρ of neighbours", "mean radiance", "row"], &lines);
-    page.paragraph("One picture of each sampler, so these numbers have no intervals; the tables of replicates do. What equal seconds buy is in the next section.");
+    page.paragraph("One picture of each sampler, so these numbers have no intervals; the tables of replicates do. What equal seconds buy is in the next section. \
+         To flip between the whole pictures, open `images/flip/` in an image viewer after a run (in the order of the table; kept out of the repository).");
 }
