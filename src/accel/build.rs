@@ -64,7 +64,6 @@ pub struct Accel {
     pub(super) slots: Vec<Slot>,
     /// Levels below the root, which bounds a traversal's stack.
     pub(super) depth: usize,
-    pad: f32,
 }
 
 impl Accel {
@@ -75,7 +74,7 @@ impl Accel {
     /// threads, so the tree is a function of its arguments.
     pub fn new(triangles: &[Triangle], reach: f32) -> Self {
         let pad = box_padding(reach);
-        let mut accel = Self { nodes: Vec::new(), slots: Vec::with_capacity(triangles.len()), depth: 0, pad };
+        let mut accel = Self { nodes: Vec::new(), slots: Vec::with_capacity(triangles.len()), depth: 0 };
         if triangles.is_empty() {
             return accel;
         }
@@ -88,19 +87,9 @@ impl Accel {
         accel
     }
 
-    /// Number of triangles.
-    pub fn triangle_count(&self) -> usize {
-        self.slots.len()
-    }
-
     /// Bytes that tree and triangles take.
     pub fn bytes(&self) -> usize {
         self.nodes.len() * size_of::<Node>() + self.slots.len() * size_of::<Slot>()
-    }
-
-    /// How far boxes reach beyond their triangles.
-    pub fn padding(&self) -> f32 {
-        self.pad
     }
 
     /// Copies obvhs' tree, depth first, so that a node's first child follows it.

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::sampling::{Decision, SampleLayout};
 
 use super::camera::{Aperture, Camera, PixelSample};
-use super::config::{CameraConfig, Estimator, SceneConfig, Shading};
+use super::config::{Estimator, SceneConfig, Shading};
 use super::geometry::{self, Face};
 use super::light::LightSet;
 use super::mesh::{Mesh, Texture};
@@ -162,9 +162,4 @@ impl Scene {
 fn reach(mesh: &Mesh, eye: Vec3) -> f32 {
     let largest = mesh.positions.iter().flatten().fold(eye.abs(), |m, p| m.max(p.abs())).max_element();
     2.0 * largest
-}
-
-/// A camera configuration for scenes built in memory: at `pos`, looking along `dir`, pinhole.
-pub fn pinhole_at(pos: Vec3, dir: Vec3, up: Vec3, fov_degrees: f32) -> CameraConfig {
-    CameraConfig { pos, dir, up, fov_degrees, lens_radius: 0.0, focal_depth: 1.0 }
 }
