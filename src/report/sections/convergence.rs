@@ -5,10 +5,10 @@ use crate::stats::{Estimate, IntervalKind};
 use super::super::evidence::{Answer, above, below};
 use super::super::markdown::Page;
 use super::super::numbers::{counted, estimate, listed, percent, short, signed_estimate};
-use super::super::summarise::{Slope, Summary};
+use super::super::summarise::{SLOPE_COUNTS, Slope, Summary};
 use super::super::write::Figures;
-use super::words::{estimate_cell, name, replicates, row, scene_name};
-use super::{show, titles};
+use super::words::{estimate_cell, level, name, replicates, row, scene_name};
+use super::{show, tabulate, tabulate_folded, titles};
 
 /// What independent samples have.
 const INDEPENDENT: f64 = -0.5;
@@ -40,7 +40,12 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
             std::iter::once(name(summary, sampler)).chain(cells).collect()
         })
         .collect();
-    page.table(&head.iter().map(String::as_str).collect::<Vec<_>>(), &lines);
+    let (low, high) = (SLOPE_COUNTS.start(), SLOPE_COUNTS.end());
+    let caption = format!(
+        "Slope of log RMSE in log spp (no unit), powers of two from {low} to {high} that the sampler takes as asked, and the number of points of the fit; {}.",
+        level(summary)
+    );
+    tabulate(page, "slopes", &caption, &head, &lines);
     let starred =
         summary.slopes.iter().filter_map(|slope| slope.fit.as_ref()).any(|fit| fit.interval == IntervalKind::Residuals);
     let star =
@@ -49,7 +54,11 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
     let items: Vec<String> = (0..summary.scenes.len()).filter_map(|scene| slope_sentence(summary, scene)).collect();
     page.bullets(&items);
     let (lines, head) = rmse_table(summary);
-    page.table(&head.iter().map(String::as_str).collect::<Vec<_>>(), &lines);
+    let caption = format!(
+        "RMSE in W/(m² sr) at every count of samples per pixel asked for, {}; intervals are in [summary.csv](summary.csv).",
+        counted(summary.about.experiment.replicates as usize, "replicate", "replicates")
+    );
+    tabulate_folded(page, "rmse", "RMSE at every count", &caption, &head, &lines);
 }
 
 /// Which slopes are told apart from −1/2.
@@ -127,7 +136,12 @@ pub fn bias_and_variance(summary: &Summary, figures: &Figures, page: &mut Page) 
             ])
         })
         .collect();
-    page.table(&["scene", "sampler", "bias²", "variance", "MSE", "bias² / MSE", "replicates", "row"], &lines);
+    let caption = format!(
+        "Squared bias, variance and their sum, the mean square error (MSE), in (W/(m² sr))² at {most} spp; {}.",
+        level(summary)
+    );
+    let head = ["scene", "sampler", "bias²", "variance", "MSE", "bias² / MSE", "replicates", "row"];
+    tabulate_folded(page, "bias", "The numbers of the figure", &caption, &head, &lines);
     let fixed: Vec<String> = (0..summary.samplers.len())
         .filter(|&i| summary.cells.iter().any(|cell| cell.sampler == i && cell.is_fixed))
         .map(|i| name(summary, i))

@@ -2,6 +2,17 @@
 //!
 //! A sentence that asserts something is made by a function of numbers, with other words for the other outcome and for
 //! "cannot tell": the same functions write true sentences about another experiment.
+//!
+//! **A new section** is a file of its own with a function `section(summary, figures, page)`, called from [`report`] at its
+//! place in the order. It opens with `page.heading(2, titles::…)`, which puts it into the table of contents. Figures and
+//! tables number themselves in the order of the page:
+//!
+//! - [`show`]`(page, figures, "name", is_chart, caption)` shows the file `figures/name.*`; its key is its name.
+//! - [`tabulate`]`(page, "key", caption, &head, &rows)` is a table that belongs to the reader's path;
+//!   [`tabulate_folded`] one of evidence, behind a line that opens it (more than about 12 lines, or one of many alike).
+//! - A caption is whole sentences that state metric and unit, n or spp, scene, replicates and level.
+//! - [`figure_ref`](super::markdown::figure_ref)`("name")` and [`table_ref`](super::markdown::table_ref)`("key")` in any text, before or
+//!   after, become `Figure 3` and `Table 5` with a link; [`link_to`](super::markdown::link_to)`(titles::…)` names a section.
 
 mod answers;
 mod convergence;
@@ -36,6 +47,7 @@ mod titles {
 pub fn report(summary: &Summary, figures: &Figures) -> String {
     let mut page = Page::new();
     opening::title(summary, &mut page);
+    page.contents();
     answers::section(summary, &mut page);
     opening::what_was_run(summary, &mut page);
     opening::how_to_read(summary, &mut page);
@@ -58,16 +70,35 @@ pub fn report(summary: &Summary, figures: &Figures) -> String {
     page.finish()
 }
 
-/// Shows a figure with its caption, or says why it is not there.
+/// Shows a numbered figure with its caption, or says why it is not there.
 fn show(page: &mut Page, figures: &Figures, name: &str, is_chart: bool, caption: &str) {
     let ending = if is_chart { "svg" } else { "png" };
     let also = if is_chart { format!(" ([PNG](figures/{name}.png))") } else { String::new() };
-    let image = format!("![{}](figures/{name}.{ending})", caption.replace(['[', ']', '`'], ""));
     match figures.state(name) {
         // A kept figure is that of the run that made the rows: the same text, with or without the images at hand.
-        FigureState::Drawn | FigureState::Kept => page.paragraph(&format!("{image}\n\n*{caption}*{also}")),
+        FigureState::Drawn | FigureState::Kept => {
+            page.figure(name, &format!("figures/{name}.{ending}"), caption, &also);
+        }
         FigureState::Absent(why) => page.paragraph(&format!("*Not shown: {name}. {}*", sentence(&why))),
     }
+}
+
+/// A numbered table under its caption; other text names it as `table_ref(key)`.
+fn tabulate<S: AsRef<str>>(page: &mut Page, key: &str, caption: &str, head: &[S], rows: &[Vec<String>]) {
+    page.captioned_table(key, caption, head, rows);
+}
+
+/// [`tabulate`] behind a line that opens it.
+fn tabulate_folded<S: AsRef<str>>(
+    page: &mut Page,
+    key: &str,
+    title: &str,
+    caption: &str,
+    head: &[S],
+    rows: &[Vec<String>],
+) {
+    let lines = super::numbers::counted(rows.len(), "line", "lines");
+    page.folded(&format!("{title} ({lines})"), |page| page.captioned_table(key, caption, head, rows));
 }
 
 /// `why` as a sentence.

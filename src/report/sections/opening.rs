@@ -4,8 +4,8 @@ use super::super::markdown::{Page, link_to};
 use super::super::numbers::{counted, listed, short};
 use super::super::provenance;
 use super::super::summarise::{SLOPE_COUNTS, Summary};
-use super::titles;
 use super::words::name;
+use super::{tabulate, titles};
 
 /// Title, provenance, and what is missing.
 pub fn title(summary: &Summary, page: &mut Page) {
@@ -126,9 +126,18 @@ pub fn scenes_and_samplers(summary: &Summary, page: &mut Page) {
         .collect();
     let head =
         ["scene", "decisions and the dimensions they read", "lens", "pixels", "mean radiance", "reference's RMSE"];
-    page.table(&head, &rows);
+    let caption = "Scenes: what each decides at random, size of the compared images in pixels, mean radiance and the reference's own error (root mean \
+                   square, RMSE) in W/(m² sr).";
+    tabulate(page, "scenes", caption, &head, &rows);
     let rows: Vec<Vec<String>> = (0..summary.samplers.len()).map(|i| sampler_row(summary, i)).collect();
-    page.table(&["sampler", "stands for", "what it does", "random", "takes where 26 are asked"], &rows);
+    let caption = "Samplers: the full form of each name, what it means, and the samples per pixel that it takes where 26 are asked for.";
+    tabulate(
+        page,
+        "samplers",
+        caption,
+        &["sampler", "stands for", "what it does", "random", "takes where 26 are asked"],
+        &rows,
+    );
     page.paragraph(&format!("What each is good for: {}.", link_to(titles::TABLE)));
 }
 

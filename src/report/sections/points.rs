@@ -9,7 +9,7 @@ use super::super::numbers::{counted, estimate, listed, signed_estimate};
 use super::super::summarise::{PointSet, SLOPE_POINTS, Summary};
 use super::super::write::Figures;
 use super::words::{name, ratio_cell, row};
-use super::{show, titles};
+use super::{show, tabulate, titles};
 
 /// The sheet's Figure 2.
 pub fn figure_2(summary: &Summary, figures: &Figures, page: &mut Page) {
@@ -29,6 +29,11 @@ fn star_sets(summary: &Summary, sampler: usize) -> Vec<&PointSet> {
         summary.point_sets.iter().filter(|set| set.sampler == sampler && set.metric == "star").collect();
     sets.sort_by_key(|set| set.n.taken);
     sets
+}
+
+/// `8 sets`.
+fn sets_measured(summary: &Summary) -> String {
+    counted(summary.about.experiment.points.as_ref().map_or(1, |points| points.replicates as usize), "set", "sets")
 }
 
 /// Slope of the root mean square star discrepancy in n, over powers of two from [`SLOPE_POINTS`].
@@ -88,8 +93,11 @@ pub fn discrepancy(summary: &Summary, figures: &Figures, page: &mut Page) {
         cells.push(fit.map_or("0".to_owned(), |fit| fit.points.to_string()));
         cells
     };
-    let head: Vec<&str> = head.iter().map(String::as_str).collect();
-    page.table(&head, &(0..summary.samplers.len()).map(line).collect::<Vec<_>>());
+    let caption = format!(
+        "Star discrepancy D* (no unit) of one decision's points at some numbers of points n, mean of {} with 95 % intervals in brackets, and its slope in n.",
+        sets_measured(summary)
+    );
+    tabulate(page, "discrepancy", &caption, &head, &(0..summary.samplers.len()).map(line).collect::<Vec<_>>());
     page.paragraph(&format!(
         "The slope is that of the root mean square over sets, powers of two from {SLOPE_POINTS}; independent points have −0.5."
     ));
@@ -163,11 +171,12 @@ fn evenness_table(summary: &Summary, compared: &[(usize, Estimate, u32, String)]
         })
         .collect();
     let heads = ["sampler", "D* / uniform's D*", "t-value", "least distance (torus)", "row"];
-    page.table(&heads, &rows);
-    page.paragraph(&format!(
-        "The t-value (0 is best) says how coarse boxes must be to hold equal shares of the points, range over {}; – where n is no power of two.",
-        counted(summary.about.experiment.points.as_ref().map_or(1, |p| p.replicates as usize), "set", "sets")
-    ));
+    let caption = format!(
+        "Evenness of n = {n} points: D* over that of uniform points with its 95 % interval; t-value (0 is best: how coarse boxes must be to hold equal \
+         shares of the points; – where n is no power of two) and least toroidal distance between two points of the unit square, each as the range over {}.",
+        sets_measured(summary)
+    );
+    tabulate(page, "evenness", &caption, &heads, &rows);
 }
 
 /// The range of values over replicates.

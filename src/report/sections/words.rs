@@ -110,6 +110,14 @@ pub fn replicates(cell: &Cell) -> String {
     if cell.is_fixed { "1, nothing random".to_owned() } else { cell.replicates.to_string() }
 }
 
+/// How many replicates intervals come from, for captions: `8 replicates (1 where nothing is random), 95 % intervals`.
+pub fn level(summary: &Summary) -> String {
+    let n = summary.about.experiment.replicates as usize;
+    let fixed =
+        if n > 1 && summary.cells.iter().any(|cell| cell.is_fixed) { " (1 where nothing is random)" } else { "" };
+    format!("{}{fixed}, 95 % intervals in brackets", counted(n, "replicate", "replicates"))
+}
+
 /// `3 scenes`.
 pub fn scenes(n: usize) -> String {
     counted(n, "scene", "scenes")
