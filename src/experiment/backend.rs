@@ -8,8 +8,10 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+pub use super::variant::Variant;
 use crate::error::Result;
 use crate::film::Image;
+use crate::sampling::Decision;
 pub use crate::scene::compile::Stage;
 pub use crate::scene::config::Estimator;
 
@@ -130,6 +132,13 @@ pub struct SceneFacts {
     pub memory_bytes: u64,
 }
 
+impl SceneFacts {
+    /// Whether a light is picked among several: only then does it matter whether the pick's probability is divided by.
+    pub fn picks_lights(&self) -> bool {
+        self.layout.contains(Decision::LightPick.name())
+    }
+}
+
 /// Numbers that stand for the code behind an item: each is raised when, and only when, that code's bits change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Algorithms {
@@ -162,6 +171,8 @@ pub struct RenderRequest<'a> {
     pub estimator: Estimator,
     /// How much of the picture is sampled.
     pub stage: Stage,
+    /// How the image is made.
+    pub variant: Variant,
     /// Threads to use; no bit depends on it.
     pub threads: usize,
 }
@@ -201,6 +212,15 @@ pub trait Backend {
     /// Kind `Input` that names the decision.
     fn check_sampler(&self, canonical: &str, scene: &str) -> Result<()> {
         let _ = (canonical, scene);
+        Ok(())
+    }
+
+    /// Whether the scene can be made in this variant.
+    ///
+    /// # Errors
+    /// Kind `Input` that says why not.
+    fn check_variant(&self, scene: &str, variant: Variant) -> Result<()> {
+        let _ = (scene, variant);
         Ok(())
     }
 

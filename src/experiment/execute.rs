@@ -349,6 +349,10 @@ impl<'a> Run<'a> {
             None => None,
             Some(id) => Some(measure::errors(&image, &*self.reference(id)?, id, item.metrics_algorithm)),
         };
+        let twin = match &work.twin {
+            None => None,
+            Some(id) => Some(measure::difference(&image, &*self.image(id)?, id)),
+        };
         Ok(ImageRow {
             schema: SCHEMA,
             id: item.id.clone(),
@@ -361,9 +365,11 @@ impl<'a> Run<'a> {
             seed: work.seed,
             estimator: work.estimator,
             stage: work.stage,
+            variant: work.variant,
             size: work.size,
             mean: measure::mean_value(&image.pixels),
             pixels: pixel_hash(&image.pixels),
+            twin,
             errors,
         })
     }
@@ -404,6 +410,7 @@ impl<'a> Run<'a> {
             names: self.names(&work.sampler),
             spp: work.spp,
             estimator: work.estimator,
+            variant: work.variant,
             size: work.size,
             reference_id: work.reference_id.clone(),
             metrics_algorithm: item.metrics_algorithm,
@@ -516,6 +523,7 @@ impl<'a> Run<'a> {
             size: work.size,
             estimator: work.estimator,
             stage: work.stage,
+            variant: work.variant,
             threads: self.options.threads,
         })
     }
@@ -550,6 +558,9 @@ impl<'a> Run<'a> {
                 ("estimator", work.estimator.name().to_owned()),
                 ("stage", work.stage.name().to_owned()),
             ]);
+            if !work.variant.is_plain() {
+                fields.push(("variant", work.variant.to_string()));
+            }
         }
         fields.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
     }

@@ -5,14 +5,16 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::backend::{Algorithms, Backend, PointMetrics, RenderRequest, SceneFacts, Size};
+use super::backend::{Algorithms, Backend, PointMetrics, RenderRequest, SceneFacts, Size, Variant};
 use super::exact;
 use crate::error::{Error, Result};
 use crate::film::Image;
 use crate::render;
-use crate::sampling::{self, Preset, SampleLayout, Sampler, SamplerSet, SamplerSpec, point_set};
-use crate::scene::compile::{Scene, Stage};
+use crate::sampling::hash::derive;
+use crate::sampling::{self, PointSource, Preset, SampleLayout, Sampler, SamplerSet, SamplerSpec, point_set};
+use crate::scene::compile::{Scene, Stage, check_reach};
 use crate::scene::load::{self, LoadedScene, OpenOptions};
+use crate::scene::scale::scaled;
 use crate::stats::discrepancy::{L2Kind, Points, l2_root, min_toroidal_distance, star_2d, t_value};
 
 /// Raised whenever the bits of image errors or point-set metrics may change.
@@ -37,8 +39,8 @@ pub const POINT_METRICS: [&str; 12] = [
     "min_toroidal_distance",
 ];
 
-/// A scene in memory at the busiest moment, in sizes of itself: the mesh as loaded, the full scene, that of one stage,
-/// and what building a tree needs meanwhile.
+/// A scene in memory at the busiest moment, in sizes of itself: the mesh as loaded, the full scene, that of one stage or
+/// of another scale, and what building a tree needs meanwhile.
 const SCENE_COPIES: u64 = 5;
 
 /// A scene that was opened.
@@ -46,8 +48,26 @@ struct Opened {
     loaded: LoadedScene,
     /// Decisions of the full picture.
     layout: SampleLayout,
-    /// By stage: the full scene always, one other at the most.
-    compiled: HashMap<&'static str, Scene>,
+    /// The full scene in its own scale always, one other at the most.
+    compiled: HashMap<Compiled, Scene>,
+}
+
+/// What one compiled scene is good for: a stage, and the factor of all lengths in bits, as floats are no keys.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct Compiled {
+    stage: &'static str,
+    scale: u32,
+}
+
+impl Compiled {
+    fn new(stage: Stage, variant: Variant) -> Self {
+        Self { stage: stage.name(), scale: variant.scale().to_bits() }
+    }
+
+    /// The whole picture in the scene's own scale.
+    fn full() -> Self {
+        Self::new(Stage::Final, Variant::Plain)
+    }
 }
 
 /// Renders with the lab.
@@ -141,7 +161,7 @@ impl Backend for Lab {
             memory_bytes: SCENE_COPIES * full.bytes() as u64,
         };
         let layout = full.layout.clone();
-        let compiled = HashMap::from([(Stage::Final.name(), full)]);
+        let compiled = HashMap::from([(Compiled::full(), full)]);
         self.scenes.borrow_mut().insert(name, Opened { loaded, layout, compiled });
         Ok(facts)
     }
@@ -169,6 +189,13 @@ impl Backend for Lab {
         self.with(scene, |opened| Sampler::new(spec, &opened.layout, 1, 0).map(|_| ()))
     }
 
+    fn check_variant(&self, scene: &str, variant: Variant) -> Result<()> {
+        self.with(scene, |opened| {
+            let at = |e: Error| Error { place: format!("{}: {variant}", e.place), ..e };
+            check_reach(opened.compiled[&Compiled::full()].reach() * variant.scale()).map_err(at)
+        })
+    }
+
     fn algorithms(&self, _: &str) -> Algorithms {
         Algorithms {
             renderer: render::ALGORITHM,
@@ -184,11 +211,13 @@ impl Backend for Lab {
         let mut scenes = self.scenes.borrow_mut();
         let opened = scenes.get_mut(request.scene).expect("a plan asks for scenes that it opened");
         let size = (request.size.width, request.size.height);
-        opened.compiled.retain(|&stage, _| stage == Stage::Final.name() || stage == request.stage.name());
-        let scene = match opened.compiled.entry(request.stage.name()) {
+        let wanted = Compiled::new(request.stage, request.variant);
+        opened.compiled.retain(|&compiled, _| compiled == Compiled::full() || compiled == wanted);
+        let scene = match opened.compiled.entry(wanted) {
             std::collections::hash_map::Entry::Occupied(entry) => entry.into_mut(),
             std::collections::hash_map::Entry::Vacant(entry) => {
-                entry.insert(Scene::new(&opened.loaded.config, opened.loaded.mesh.clone(), size, request.stage)?)
+                let (config, mesh) = scaled(&opened.loaded.config, &opened.loaded.mesh, request.variant.scale());
+                entry.insert(Scene::new(&config, mesh, size, request.stage)?)
             }
         };
         scene.resize(size);
@@ -201,16 +230,25 @@ impl Backend for Lab {
         let pool = self.pool(request.threads)?;
         let spec = spec(request.sampler)?;
         self.with(request.scene, |opened| {
-            let scene = &opened.compiled[request.stage.name()];
-            let sampler = Sampler::new(spec, &scene.layout, request.spp, request.seed)?;
-            let rendered = pool.install(|| render::render(scene, &sampler));
-            rendered.map(|rendered| rendered.image).map_err(|bad| Error::incomplete(request.scene, bad))
+            let scene = &opened.compiled[&Compiled::new(request.stage, request.variant)];
+            let pass = |number: u64, asked: u32| {
+                // The first pass draws what a single one would; a later one begins anew with numbers of its own.
+                let seed = if number == 0 { request.seed } else { derive(request.seed, &[number]) };
+                let sampler = Sampler::new(spec, &scene.layout, asked, seed)?;
+                let rendered = pool.install(|| render::render(scene, &sampler));
+                let rendered = rendered.map_err(|bad| Error::incomplete(request.scene, bad))?;
+                Ok((rendered.image, sampler.samples()))
+            };
+            let mut passes = (0..).zip(request.variant.passes(request.spp));
+            let (number, asked) = passes.next().expect("an image takes a pass at least");
+            let first = pass(number, asked)?;
+            passes.try_fold(first, |done, (number, asked)| Ok(joined(done, pass(number, asked)?))).map(|(image, _)| image)
         })
     }
 
     fn focal_depth(&self, scene: &str, size: Size) -> Option<f64> {
         let mut scenes = self.scenes.borrow_mut();
-        let full = scenes.get_mut(scene)?.compiled.get_mut(Stage::Final.name())?;
+        let full = scenes.get_mut(scene)?.compiled.get_mut(&Compiled::full())?;
         full.resize((size.width, size.height));
         full.focal_depth().map(f64::from)
     }
@@ -231,6 +269,15 @@ impl Backend for Lab {
         let points = Points::new_2d(&set).map_err(|e| Error::incomplete(canonical, e))?;
         metrics.iter().map(|name| Ok((name.clone(), point_metric(name, &points)?))).collect()
     }
+}
+
+/// Two images as one of all their samples: means weighted by the samples taken, in f64, rounded once.
+fn joined((mut a, na): (Image, u32), (b, nb): (Image, u32)) -> (Image, u32) {
+    let (wa, wb) = (f64::from(na), f64::from(nb));
+    for (a, b) in a.pixels.as_flattened_mut().iter_mut().zip(b.pixels.as_flattened()) {
+        *a = ((wa * f64::from(*a) + wb * f64::from(*b)) / (wa + wb)) as f32;
+    }
+    (a, na + nb)
 }
 
 /// One metric of a set in the plane; roots of the L2 kinds.

@@ -7,7 +7,7 @@ use crate::film::Image;
 use crate::stats::{Ensemble, Estimate, image_error, sum, t_interval};
 
 use super::identity::pixel_hash;
-use super::results::ImageErrors;
+use super::results::{ImageErrors, TwinDifference};
 
 /// What images are compared with: two independent halves, or a closed form given twice.
 pub struct ReferenceImages {
@@ -68,6 +68,19 @@ pub fn errors(image: &Image, reference: &ReferenceImages, reference_id: &str, me
         mae: image_error::mae(t, r),
         bias: image_error::bias(t, r),
         error_autocorrelation: autocorrelation(image, reference),
+    }
+}
+
+/// What differs between an image and its twin.
+pub fn difference(image: &Image, twin: &Image, twin_id: &str) -> TwinDifference {
+    let bits = |pixel: &[f32; 3]| pixel.map(f32::to_bits);
+    let differing = std::iter::zip(&image.pixels, &twin.pixels).filter(|(a, b)| bits(a) != bits(b)).count();
+    let (a, b) = (image.pixels.as_flattened(), twin.pixels.as_flattened());
+    TwinDifference {
+        id: twin_id.to_owned(),
+        differing: differing as f64 / image.pixels.len() as f64,
+        largest: image_error::max_abs(a, b),
+        rms: image_error::mse(a, b).sqrt(),
     }
 }
 
@@ -140,6 +153,17 @@ mod tests {
         let e = errors(&image, &reference, "r", 1);
         // Two differences of ±1/2 among six channels.
         assert!((e.mse - 0.5 / 6.0).abs() < 1e-16 && e.mse == e.mse_unbiased && e.bias == 0.0, "{e:?}");
+    }
+
+    #[test]
+    fn twins_differ_by_share_largest_and_root_mean_square() {
+        let a = Image { width: 2, height: 1, pixels: vec![[1.0, 2.0, 3.0], [0.0; 3]] };
+        let b = Image { width: 2, height: 1, pixels: vec![[1.0, 2.0, 3.0], [0.0, -1.5, 0.0]] };
+        assert_eq!((difference(&a, &a, "a").differing, difference(&a, &a, "a").rms), (0.0, 0.0));
+        let d = difference(&b, &a, "a");
+        assert_eq!((d.id.as_str(), d.differing, d.largest, d.rms), ("a", 0.5, 1.5, (1.5f64 * 1.5 / 6.0).sqrt()));
+        let zeros = |zero: f32| Image { width: 1, height: 1, pixels: vec![[zero; 3]] };
+        assert_eq!(difference(&zeros(0.0), &zeros(-0.0), "a").differing, 1.0, "bits, not values");
     }
 
     #[test]

@@ -21,3 +21,4 @@ pub mod progress;
 pub mod results;
 pub mod spec;
 pub mod survey;
+pub mod variant;

@@ -5,13 +5,16 @@
 //! sampler, the spp and the replicate. No list position goes into either, so adding a sampler, a scene, an spp or a
 //! replicate leaves every existing image as it is.
 
+mod variants;
+
 use std::collections::{HashMap, HashSet};
 
-use super::backend::{Algorithms, Backend, Estimator, SceneFacts, Size, Stage};
+use super::backend::{Algorithms, Backend, Estimator, SceneFacts, Size, Stage, Variant};
 use super::identity::{Fingerprint, SeedOf};
 use super::results::{Count, Kind};
 use super::spec::{Experiment, Pictures};
 use crate::error::{Error, Result, did_you_mean};
+use variants::{is_seeded_as_its_twin, probed_samplers};
 
 /// One image to render.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -34,8 +37,12 @@ pub struct ImageWork {
     pub estimator: Estimator,
     /// How much of the picture is sampled.
     pub stage: Stage,
+    /// How it is made.
+    pub variant: Variant,
     /// Id of the reference that the image is compared with.
     pub reference_id: Option<String>,
+    /// Id of the image that this one is another making of, where it is: what differs between them is measured.
+    pub twin: Option<String>,
 }
 
 impl ImageWork {
@@ -85,6 +92,8 @@ pub struct EnsembleWork {
     pub size: Size,
     /// Light estimator.
     pub estimator: Estimator,
+    /// How the images are made.
+    pub variant: Variant,
     /// Id of the reference.
     pub reference_id: String,
     /// Ids of the replicates.
@@ -198,13 +207,24 @@ impl WorkItem {
                     Kind::Stage => format!("stage {}", work.stage.name()),
                     _ => format!("replicate {}", work.replicate),
                 };
-                format!("{} {} {} spp {} {what}", work.scene, work.sampler, work.spp.asked, work.size)
+                let way = way(work.estimator, work.variant);
+                format!("{} {} {} spp {} {what}{way}", work.scene, work.sampler, work.spp.asked, work.size)
             }
             Work::Reference(work) => format!("{} {} reference", work.scene, work.size),
-            Work::Ensemble(work) => format!("{} {} {} spp ensemble", work.scene, work.sampler, work.spp.asked),
+            Work::Ensemble(work) => {
+                let way = way(work.estimator, work.variant);
+                format!("{} {} {} spp ensemble{way}", work.scene, work.sampler, work.spp.asked)
+            }
             Work::Points(work) => format!("{} {} points replicate {}", work.sampler, work.n.asked, work.replicate),
         }
     }
+}
+
+/// What is not plain about the making of an image, in words.
+fn way(estimator: Estimator, variant: Variant) -> String {
+    let shortcut = if estimator == Estimator::Sheet { ", sheet's estimator" } else { "" };
+    let variant = if variant.is_plain() { String::new() } else { format!(", {variant}") };
+    format!("{shortcut}{variant}")
 }
 
 /// A sampler of the experiment; texts that mean the same one are together.
@@ -271,7 +291,7 @@ impl Plan {
             Work::Reference(_) => self.reference_images(&item.id).to_vec(),
             Work::Image(work) => {
                 let reference = work.reference_id.iter().flat_map(|id| self.reference_images(id));
-                reference.chain([item.id.as_str()]).collect()
+                reference.chain(work.twin.as_deref()).chain([item.id.as_str()]).collect()
             }
             Work::Ensemble(work) => {
                 let reference = self.reference_images(&work.reference_id);
@@ -310,18 +330,22 @@ pub fn plan(experiment: &Experiment, backend: &dyn Backend) -> Result<Plan> {
         backend.check_sampler(&sampler.canonical, &scene.name).map_err(place)?;
     }
     check_metrics(experiment, backend)?;
+    let probed = probed_samplers(experiment, backend, &samplers, &scenes)?;
     let mut planner = Planner {
         experiment,
         backend,
         reference: &reference_sampler,
         is_shown: false,
         items: Vec::new(),
+        ids: HashSet::new(),
         notes: Vec::new(),
     };
     planner.note_samplers(&samplers);
     planner.add_points(&samplers);
     for (name, scene) in experiment.scenes.iter().zip(&scenes) {
-        planner.add_statistics(scene, experiment.size.of(name, scene.size), &samplers);
+        let is_probed = experiment.stability.as_ref().is_some_and(|stability| stability.scenes.contains(name));
+        let probed = if is_probed { probed.as_slice() } else { &[] };
+        planner.add_statistics(scene, experiment.size.of(name, scene.size), &samplers, probed);
     }
     if let Some(pictures) = &experiment.pictures {
         for (_, scene) in experiment.scenes.iter().zip(&scenes).filter(|(name, _)| **name == pictures.scene) {
@@ -335,7 +359,8 @@ pub fn plan(experiment: &Experiment, backend: &dyn Backend) -> Result<Plan> {
     Ok(Plan { experiment: experiment.clone(), scenes, samplers, reference_sampler, items, notes, positions })
 }
 
-/// Items that draw numbers have seeds of their own: an image must share no randomness with what it is compared with.
+/// Items that draw numbers have seeds of their own: an image must share no randomness with what it is compared with. An
+/// image's twin is another making of the same randomisation, so those two may.
 ///
 /// # Errors
 /// Kind `Input` that names both items.
@@ -343,6 +368,9 @@ pub fn refuse_equal_seeds(items: &[WorkItem], place: &str) -> Result<()> {
     let mut seen: HashMap<u64, &WorkItem> = HashMap::new();
     for item in items {
         let Some(seed) = item.seed() else { continue };
+        if is_seeded_as_its_twin(item, seen.get(&seed).copied()) {
+            continue;
+        }
         if let Some(other) = seen.insert(seed, item) {
             let what = format!(
                 "expected every item to have a seed of its own, found {seed} for both \"{}\" and \"{}\"; choose another experiment seed",
@@ -430,6 +458,15 @@ fn check_metrics(experiment: &Experiment, backend: &dyn Backend) -> Result<()> {
     Ok(())
 }
 
+/// How the replicates of a sampler are made.
+#[derive(Debug, Clone, Copy)]
+struct Making {
+    /// Samples per pixel asked for.
+    asked: u32,
+    estimator: Estimator,
+    variant: Variant,
+}
+
 /// Collects items.
 struct Planner<'a> {
     experiment: &'a Experiment,
@@ -438,6 +475,7 @@ struct Planner<'a> {
     /// Whether the items added now are looked at.
     is_shown: bool,
     items: Vec<WorkItem>,
+    ids: HashSet<String>,
     notes: Vec<String>,
 }
 
@@ -485,8 +523,9 @@ impl Planner<'_> {
 
     /// Adds an item unless the same one is there already, and gives its id.
     fn push(&mut self, id: String, metrics_algorithm: u32, work: Work) -> String {
-        // Only closed forms can meet here: a scene's and its pictures' at one size.
-        if !self.items.iter().any(|item| item.id == id) {
+        // What is asked for twice is done once: a closed form of a scene's and its pictures' one size, the plain images of a
+        // count that stability is asked about.
+        if self.ids.insert(id.clone()) {
             self.items.push(WorkItem { id: id.clone(), metrics_algorithm, is_shown: self.is_shown, work });
         }
         id
@@ -523,46 +562,53 @@ impl Planner<'_> {
         self.push(id, numbers.metrics, Work::Points(work));
     }
 
-    /// One scene: its reference, then sampler by sampler and spp by spp the replicates and what they say together.
-    fn add_statistics(&mut self, scene: &SceneFacts, size: Size, samplers: &[PlannedSampler]) {
+    /// One scene: its reference, then sampler by sampler and spp by spp the replicates and what they say together, each
+    /// followed by what is held against it.
+    fn add_statistics(&mut self, scene: &SceneFacts, size: Size, samplers: &[PlannedSampler], probed: &[String]) {
         self.note_scene(scene, samplers);
         let reference_id = self.add_reference(scene, size, self.experiment.reference.spp, "reference");
         for sampler in samplers {
-            for &asked in &self.experiment.spp {
-                self.add_replicates(scene, size, sampler, asked, &reference_id);
+            self.add_shortcut_of(scene, size, sampler, &reference_id);
+            if probed.contains(&sampler.canonical) {
+                self.add_stability_of(scene, size, sampler, &reference_id);
             }
         }
     }
 
-    /// The replicates of one sampler at one spp, and their ensemble.
+    /// The replicates of one sampler made one way, and their ensemble; the replicates' ids. Each has its twin's seed, where
+    /// it has one.
     fn add_replicates(
         &mut self,
         scene: &SceneFacts,
         size: Size,
         sampler: &PlannedSampler,
-        asked: u32,
+        making: Making,
         reference_id: &str,
-    ) {
-        let estimator = self.experiment.estimator;
-        let spp = self.count(&sampler.canonical, Some(scene), asked);
-        let members: Vec<String> = (0..self.replicates(&sampler.canonical, Some(scene), self.experiment.replicates))
+        twins: &[String],
+    ) -> Vec<String> {
+        let Making { asked, estimator, variant } = making;
+        let sampler = &sampler.canonical;
+        let spp = self.count_of(sampler, scene, asked, variant);
+        let members: Vec<String> = (0..self.replicates(sampler, Some(scene), self.experiment.replicates))
             .map(|replicate| {
                 let work = ImageWork {
                     kind: Kind::Render,
                     scene: scene.name.clone(),
-                    sampler: sampler.canonical.clone(),
+                    sampler: sampler.clone(),
                     spp,
                     replicate,
-                    seed: self.seed("render", &scene.name, &sampler.canonical, asked, replicate),
+                    seed: self.seed("render", &scene.name, sampler, asked, replicate),
                     size,
                     estimator,
                     stage: Stage::Final,
+                    variant,
                     reference_id: Some(reference_id.to_owned()),
+                    twin: twins.get(replicate as usize).cloned(),
                 };
                 self.add_image(scene, work)
             })
             .collect();
-        let numbers = self.backend.algorithms(&sampler.canonical);
+        let numbers = self.backend.algorithms(sampler);
         let id = Fingerprint::new("ensemble")
             .with("members", members.join(","))
             .with("reference", reference_id)
@@ -570,14 +616,22 @@ impl Planner<'_> {
             .id();
         let work = EnsembleWork {
             scene: scene.name.clone(),
-            sampler: sampler.canonical.clone(),
+            sampler: sampler.clone(),
             spp,
             size,
             estimator,
+            variant,
             reference_id: reference_id.to_owned(),
-            members,
+            members: members.clone(),
         };
         self.push(id, numbers.metrics, Work::Ensemble(work));
+        members
+    }
+
+    /// Counts where the samples are taken in passes.
+    fn count_of(&self, sampler: &str, scene: &SceneFacts, asked: u32, variant: Variant) -> Count {
+        let passes = variant.passes(asked).into_iter();
+        Count { asked, taken: passes.map(|pass| self.count(sampler, Some(scene), pass).taken).sum() }
     }
 
     /// A reference and, where the scene has no closed form, its two halves; the reference's id.
@@ -613,7 +667,9 @@ impl Planner<'_> {
             size,
             estimator: Estimator::Unbiased,
             stage: Stage::Final,
+            variant: Variant::Plain,
             reference_id: None,
+            twin: None,
         };
         self.add_image(scene, work)
     }
@@ -631,9 +687,11 @@ impl Planner<'_> {
                 replicate: 0,
                 seed: self.seed("picture", &scene.name, &sampler.canonical, pictures.spp, 0),
                 size: pictures.size,
-                estimator: self.experiment.estimator,
+                estimator: self.experiment.estimator.primary(),
                 stage: Stage::Final,
+                variant: Variant::Plain,
                 reference_id: Some(reference_id.clone()),
+                twin: None,
             };
             self.add_image(scene, work);
         }
@@ -659,7 +717,9 @@ impl Planner<'_> {
             size,
             estimator: Estimator::Unbiased,
             stage,
+            variant: Variant::Plain,
             reference_id: None,
+            twin: None,
         };
         self.add_image(scene, work);
     }
@@ -668,7 +728,7 @@ impl Planner<'_> {
     /// without rendering again.
     fn add_image(&mut self, scene: &SceneFacts, work: ImageWork) -> String {
         let Algorithms { renderer, sampler, estimator, metrics, .. } = self.backend.algorithms(&work.sampler);
-        let id = Fingerprint::new("image")
+        let fingerprint = Fingerprint::new("image")
             .with("scene", &scene.content_hash)
             .with("sampler", &work.sampler)
             .with("asked", work.spp.asked)
@@ -680,8 +740,12 @@ impl Planner<'_> {
             .with("stage", work.stage.name())
             .with("renderer algorithm", renderer)
             .with("sampler algorithm", sampler)
-            .with("estimator algorithm", estimator)
-            .id();
+            .with("estimator algorithm", estimator);
+        // What everybody makes is not told apart from what was made before there were variants.
+        let id = match work.variant {
+            Variant::Plain => fingerprint.id(),
+            variant => fingerprint.with("variant", variant).id(),
+        };
         self.push(id, metrics, Work::Image(work))
     }
 

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-pub use super::backend::{Estimator, PointMetrics, SceneFacts, Size, Stage};
+pub use super::backend::{Estimator, PointMetrics, SceneFacts, Size, Stage, Variant};
 use super::backend::{estimator_word, stage_word};
 
 use super::spec::Experiment;
@@ -102,6 +102,19 @@ pub struct ImageErrors {
     pub error_autocorrelation: Option<f64>,
 }
 
+/// What differs between an image and its twin, another making of the same picture.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TwinDifference {
+    /// Id of the twin.
+    pub id: String,
+    /// Share of the pixels that differ in any bit, 0 to 1; 0 where the images are the same bit for bit.
+    pub differing: f64,
+    /// Largest absolute difference of a pixel-channel, radiance.
+    pub largest: f64,
+    /// Root mean square difference over pixel-channels, radiance.
+    pub rms: f64,
+}
+
 /// One image: kinds `reference-half`, `render`, `picture` and `stage`; the errors are there for `render` and `picture`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ImageRow {
@@ -130,12 +143,18 @@ pub struct ImageRow {
     /// How much of the picture is sampled.
     #[serde(with = "stage_word")]
     pub stage: Stage,
+    /// How the image was made; absent where plainly.
+    #[serde(default, skip_serializing_if = "Variant::is_plain")]
+    pub variant: Variant,
     /// Image size.
     pub size: Size,
     /// Mean over all pixel-channels.
     pub mean: f64,
     /// Digest of the pixels ([`pixel_hash`](super::identity::pixel_hash)): equal where two images are equal bit for bit.
     pub pixels: String,
+    /// What differs from the image that this one is another making of; absent where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub twin: Option<TwinDifference>,
     /// Errors against the reference.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub errors: Option<ImageErrors>,
@@ -192,6 +211,9 @@ pub struct EnsembleRow {
     /// Light estimator.
     #[serde(with = "estimator_word")]
     pub estimator: Estimator,
+    /// How the images were made; absent where plainly.
+    #[serde(default, skip_serializing_if = "Variant::is_plain")]
+    pub variant: Variant,
     /// Image size.
     pub size: Size,
     /// Id of the reference.
@@ -474,9 +496,11 @@ mod tests {
             seed,
             estimator: Estimator::Unbiased,
             stage: Stage::Final,
+            variant: Variant::Plain,
             size: Size { width: 80, height: 45 },
             mean: 0.25,
             pixels: "ffff".to_owned(),
+            twin: None,
             errors: Some(ImageErrors {
                 reference_id: "fedcba9876543210".to_owned(),
                 metrics_algorithm: 1,
@@ -510,6 +534,19 @@ mod tests {
             "{line}"
         );
         assert!(line.contains(r#""mse":0.5,"#) && line.ends_with(r#""error_autocorrelation":null}"#), "{line}");
+    }
+
+    #[test]
+    fn a_row_speaks_of_variant_and_twin_only_where_there_are() {
+        let mut row = row(1, 0.5);
+        assert!(!row.to_line().contains("variant") && !row.to_line().contains("twin"));
+        let Row::Image(image) = &mut row else { unreachable!() };
+        image.variant = Variant::Scaled(-6);
+        image.twin = Some(TwinDifference { id: "a".to_owned(), differing: 0.5, largest: 1e-7, rms: 0.1 + 0.2 });
+        let line = row.to_line();
+        assert!(line.contains(r#""variant":"scaled(1e-6)","#) && line.contains(r#""twin":{"id":"a","differing":0.5,"#));
+        assert_eq!(Row::parse(&line), Ok(row));
+        assert!(Row::parse(&line.replace("scaled(1e-6)", "scalded(1e-6)")).unwrap_err().contains("a variant"));
     }
 
     #[test]

@@ -13,16 +13,17 @@
 //! | `spp` | samples per pixel, each 1 to 2^24 |
 //! | `replicates` | independent randomisations of each image; 1 is used where nothing is random |
 //! | `reference` | `{"sampler", "spp"}`: two independent halves of `spp` samples per pixel, by a randomised sampler that is not compared |
-//! | `estimator` | optional: `"unbiased"` (the default) or `"sheet"`; references are always unbiased |
+//! | `estimator` | optional: `"unbiased"` (the default), `"sheet"`, or `"both"`: unbiased, and where a light is picked among several by the sheet's shortcut too; references are always unbiased |
 //! | `points` | optional: `{"n", "metrics", "replicates"}`: point-set metrics of the same samplers |
 //! | `pictures` | optional: `{"scene", "size", "spp", "reference_spp"}`: images to look at; `reference_spp` defaults to the reference's |
+//! | `stability` | optional: `{"spp", "scenes", "samplers"}`: a sample more or less, the spread of replicates, other units of length, two passes, all against `spp` samples per pixel; `scenes` and `samplers` default to all of the experiment |
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::backend::{Estimator, Size, estimator_word};
+use super::backend::{Estimator, Size, Variant};
 use crate::error::{Error, Result};
 use crate::scene::json::{self, Item, Value, suggestion};
 
@@ -54,13 +55,15 @@ pub struct Experiment {
     pub replicates: u32,
     /// What images are compared with.
     pub reference: Reference,
-    /// Light estimator of the compared images.
-    #[serde(with = "estimator_word")]
-    pub estimator: Estimator,
+    /// Light estimators of the compared images.
+    pub estimator: Estimators,
     /// Point-set metrics.
     pub points: Option<Points>,
     /// Images to look at.
     pub pictures: Option<Pictures>,
+    /// What should make no difference, made to see whether it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stability: Option<Stability>,
     /// The file, for messages; no part of the experiment.
     #[serde(skip)]
     pub place: String,
@@ -119,6 +122,69 @@ pub struct Pictures {
     pub reference_spp: u32,
 }
 
+/// Which light estimators the compared images are made with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Estimators {
+    /// Divided by the probability of the choice among lights.
+    Unbiased,
+    /// The sheet's shortcut.
+    Sheet,
+    /// Unbiased; where a light is picked among several the sheet's shortcut too.
+    Both,
+}
+
+impl Estimators {
+    /// Its word in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Unbiased => "unbiased",
+            Self::Sheet => "sheet",
+            Self::Both => "both",
+        }
+    }
+
+    /// The estimator that an experiment's comparisons of samplers are made with.
+    pub fn primary(self) -> Estimator {
+        match self {
+            Self::Unbiased | Self::Both => Estimator::Unbiased,
+            Self::Sheet => Estimator::Sheet,
+        }
+    }
+}
+
+/// Which images are made once more in other ways, see [`Variant`], and how often.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Stability {
+    /// Samples per pixel that all else is held against; [`counts`](Self::counts) are its neighbours.
+    pub spp: u32,
+    /// Scenes, as the experiment names them.
+    pub scenes: Vec<String>,
+    /// Samplers, as written; each means one of the experiment's.
+    pub samplers: Vec<String>,
+}
+
+/// The count that the exercise sheet asks for.
+pub const SHEET_SPP: u32 = 26;
+
+impl Stability {
+    /// The counts whose error is held against that of `spp`: one less (where that leaves any), one more, and the sheet's 26.
+    pub fn counts(&self) -> Vec<u32> {
+        let mut counts: Vec<u32> = Vec::new();
+        for count in [self.spp - 1, self.spp + 1, SHEET_SPP] {
+            if count > 0 && count <= MOST_SPP && count != self.spp && !counts.contains(&count) {
+                counts.push(count);
+            }
+        }
+        counts
+    }
+
+    /// The variants whose images are held against the plain ones; one sample cannot be taken in two passes.
+    pub fn variants(&self) -> Vec<Variant> {
+        Variant::COMPARED.into_iter().filter(|&variant| variant != Variant::TwoPasses || self.spp > 1).collect()
+    }
+}
+
 impl Experiment {
     /// Reads an experiment file.
     ///
@@ -142,10 +208,11 @@ impl Experiment {
         let spp = fields.need("spp", |item| counts(&item, MOST_SPP))?;
         let replicates = fields.need("replicates", |item| count(&item, MOST_REPLICATES))?;
         let reference = fields.need("reference", |item| reference(&item))?;
-        let estimators = [("unbiased", Estimator::Unbiased), ("sheet", Estimator::Sheet)];
-        let estimator = fields.or("estimator", Estimator::Unbiased, |item| item.choice(&estimators))?;
+        let estimators = [("unbiased", Estimators::Unbiased), ("sheet", Estimators::Sheet), ("both", Estimators::Both)];
+        let estimator = fields.or("estimator", Estimators::Unbiased, |item| item.choice(&estimators))?;
         let points = fields.opt("points", |item| points(&item))?;
         let pictures = fields.opt("pictures", |item| pictures(&item, &scenes, reference.spp))?;
+        let stability = fields.opt("stability", |item| stability(&item, &scenes, &samplers))?;
         fields.finish()?;
         Ok(Self {
             name,
@@ -159,6 +226,7 @@ impl Experiment {
             estimator,
             points,
             pictures,
+            stability,
             place: place.to_owned(),
         })
     }
@@ -315,6 +383,22 @@ fn pictures(item: &Item, scenes: &[String], reference_spp: u32) -> Result<Pictur
     Ok(Pictures { scene, size, spp, reference_spp })
 }
 
+/// `stability`. Whether its samplers are among the experiment's is a question of what they mean, so the plan asks it.
+fn stability(item: &Item, scenes: &[String], samplers: &[String]) -> Result<Stability> {
+    let mut fields = item.fields()?;
+    let spp = fields.need("spp", |item| count(&item, MOST_SPP))?;
+    let scenes = fields.or("scenes", scenes.to_vec(), |item| {
+        list(&item, "scene names", |item| {
+            let scene = item.text("a scene of the experiment")?;
+            known_scene(scene, scenes, item)?;
+            Ok(scene.to_owned())
+        })
+    })?;
+    let samplers = fields.or("samplers", samplers.to_vec(), |item| list(&item, "samplers", sampler))?;
+    fields.finish()?;
+    Ok(Stability { spp, scenes, samplers })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -335,7 +419,7 @@ mod tests {
     fn an_experiment_reads_with_its_defaults_made_explicit() {
         let experiment = read(SMALL).unwrap();
         assert_eq!(experiment.seed, u64::MAX);
-        assert_eq!(experiment.estimator, Estimator::Unbiased);
+        assert_eq!(experiment.estimator, Estimators::Unbiased);
         assert_eq!(experiment.pictures.as_ref().unwrap().reference_spp, 64);
         let own = Size { width: 9, height: 9 };
         assert_eq!(experiment.size.of("box", own), Size { width: 6, height: 4 });
@@ -343,14 +427,32 @@ mod tests {
     }
 
     #[test]
+    fn stability_means_all_scenes_and_samplers_where_it_names_none() {
+        let with = |entry: &str| read(&SMALL.replacen('{', &format!("{{\"stability\": {entry},"), 1)).unwrap().stability;
+        let stability = with("{\"spp\": 64}").unwrap();
+        assert_eq!(stability.scenes, ["pots", "box"]);
+        assert_eq!(stability.samplers, ["uniform", "ld:sheet"]);
+        assert_eq!(stability.counts(), [63, 65, SHEET_SPP]);
+        let counts = |spp: u32| Stability { spp, ..stability.clone() }.counts();
+        assert_eq!((counts(1), counts(25)), (vec![2, SHEET_SPP], vec![24, SHEET_SPP]));
+        assert_eq!((counts(26), counts(MOST_SPP)), (vec![25, 27], vec![MOST_SPP - 1, SHEET_SPP]));
+        assert_eq!(with("{\"spp\": 64, \"scenes\": [\"box\"]}").unwrap().scenes, ["box"]);
+    }
+
+    #[test]
     fn what_is_recorded_of_an_experiment_reads_back_equal() {
-        let experiment = Experiment { place: String::new(), ..read(SMALL).unwrap() };
-        let text = serde_json::to_string(&experiment).unwrap();
-        assert_eq!(serde_json::from_str::<Experiment>(&text).unwrap(), experiment);
+        let more = SMALL.replacen('{', "{\"stability\": {\"spp\": 64}, \"estimator\": \"both\",", 1);
+        for text in [SMALL, &more] {
+            let experiment = Experiment { place: String::new(), ..read(text).unwrap() };
+            let recorded = serde_json::to_string(&experiment).unwrap();
+            assert_eq!(serde_json::from_str::<Experiment>(&recorded).unwrap(), experiment);
+            // What is not asked for is not recorded: older records read, and stay as they are.
+            assert_eq!(recorded.contains("stability"), text.contains("stability"));
+        }
     }
 
     /// Each edit of a good file, and what the message has to say of it.
-    const BAD: [(&str, &str, &str); 29] = [
+    const BAD: [(&str, &str, &str); 34] = [
         ("\"seed\"", "\"sede\"", "expected the key \"seed\""),
         ("\"points\"", "\"pionts\"", "pionts: expected one of the keys"),
         ("\"points\"", "\"pionts\"", "did you mean \"points\"?"),
@@ -385,13 +487,30 @@ mod tests {
         ("[1, 4]", "[4, 4.0]", "spp[1]: expected each entry once"),
         ("\"replicates\": 3", "\"replicates\": 0", "replicates: expected a whole number from 1"),
         ("\"spp\": 64}", "\"spp\": 0}", "reference.spp: expected a whole number"),
-        ("\"seed\": ", "\"estimator\": \"sheat\", \"seed\": ", "estimator: expected \"unbiased\" or \"sheet\""),
+        ("\"seed\": ", "\"estimator\": \"sheat\", \"seed\": ", "estimator: expected \"unbiased\" or \"sheet\" or \"both\", found"),
         (
             "\"scene\": \"pots\"",
             "\"scene\": \"pot\"",
             "pictures.scene: expected one of the scenes pots box, found \"pot\"; did you mean",
         ),
         ("[2, 4]", "[65537]", "points.n[0]: expected a whole number from 1 to 65536"),
+        ("\"seed\": ", "\"stability\": {}, \"seed\": ", "stability: expected the key \"spp\""),
+        ("\"seed\": ", "\"stability\": {\"spp\": 0}, \"seed\": ", "stability.spp: expected a whole number from 1"),
+        (
+            "\"seed\": ",
+            "\"stability\": {\"spp\": 4, \"scenes\": [\"pos\"]}, \"seed\": ",
+            "stability.scenes[0]: expected one of the scenes pots box, found \"pos\"; did you mean",
+        ),
+        (
+            "\"seed\": ",
+            "\"stability\": {\"spp\": 4, \"samplers\": []}, \"seed\": ",
+            "stability.samplers: expected a list of samplers",
+        ),
+        (
+            "\"seed\": ",
+            "\"stability\": {\"spp\": 4, \"sampler\": []}, \"seed\": ",
+            "stability.sampler: expected one of the keys spp scenes samplers",
+        ),
     ];
 
     #[test]

@@ -94,6 +94,7 @@ fn is_result_of(row: &Row, item: &WorkItem) -> bool {
             let errors = row.errors.as_ref();
             row.kind == work.kind
                 && errors.map(|errors| &errors.reference_id) == work.reference_id.as_ref()
+                && row.twin.as_ref().map(|twin| &twin.id) == work.twin.as_ref()
                 && errors.is_none_or(|errors| errors.metrics_algorithm == metrics)
         }
         (Row::Reference(row), Work::Reference(_)) => row.metrics_algorithm == metrics,

@@ -79,12 +79,7 @@ impl Scene {
     /// Kind `Input` where coordinates are too large for single precision.
     pub fn new(config: &SceneConfig, mesh: Mesh, size: (u32, u32), stage: Stage) -> Result<Self> {
         let reach = reach(&mesh, config.camera.pos);
-        if reach > MAX_REACH {
-            return Err(Error::input(
-                "scene",
-                format!("expected coordinates up to {MAX_REACH:e}, found a reach of {reach:e}"),
-            ));
-        }
+        check_reach(reach)?;
         let accel = Accel::new(&geometry::triangles(&mesh), reach);
         let mut layout = SampleLayout::default();
         let pixel = match stage {
@@ -146,6 +141,11 @@ impl Scene {
         }
     }
 
+    /// Bound for coordinates and distances of everything a ray can start from or meet, scene units.
+    pub fn reach(&self) -> f32 {
+        reach(&self.mesh, self.camera.pos())
+    }
+
     /// Bytes that triangles, tree and textures take.
     pub fn bytes(&self) -> usize {
         let mesh = &self.mesh;
@@ -156,6 +156,18 @@ impl Scene {
             + size_of_val(mesh.uvs.as_slice())
             + mesh.textures.iter().map(Texture::bytes).sum::<usize>()
     }
+}
+
+/// Whether single precision can hold a scene of this reach.
+///
+/// # Errors
+/// Kind `Input` with the bound.
+pub fn check_reach(reach: f32) -> Result<()> {
+    // Written so that a reach which is no number is refused, too.
+    if reach <= MAX_REACH {
+        return Ok(());
+    }
+    Err(Error::input("scene", format!("expected coordinates up to {MAX_REACH:e}, found a reach of {reach:e}")))
 }
 
 /// Bound for coordinates and distances of everything a ray can start from or meet.

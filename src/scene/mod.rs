@@ -8,3 +8,4 @@ pub mod light;
 pub mod load;
 pub mod mesh;
 pub mod obj;
+pub mod scale;

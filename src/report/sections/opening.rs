@@ -1,5 +1,7 @@
 //! What was run, how to read it, scenes and samplers.
 
+use crate::experiment::spec::Estimators;
+
 use super::super::markdown::{Page, link_to};
 use super::super::numbers::{counted, listed, short};
 use super::super::provenance;
@@ -31,11 +33,11 @@ pub fn what_was_run(summary: &Summary, page: &mut Page) {
     let mut items = vec![
         format!("{}: {}.", counted(names.len(), "scene", "scenes"), listed(&names)),
         format!(
-            "{} at {} samples per pixel (spp), {} each (1 where nothing is random), {} estimator of light.",
+            "{} at {} samples per pixel (spp), {} each (1 where nothing is random), {}.",
             counted(summary.samplers.len(), "sampler", "samplers"),
             listed(&spp),
             counted(e.replicates as usize, "replicate", "replicates"),
-            e.estimator.name()
+            estimator_words(e.estimator)
         ),
         format!(
             "References: two independent halves of {} spp by `{}`, which is not compared; a closed form where the scene has one.",
@@ -66,6 +68,16 @@ pub fn what_was_run(summary: &Summary, page: &mut Page) {
         "Numbers behind every figure: [summary.csv](summary.csv), [slopes.csv](slopes.csv), [results.jsonl](results.jsonl) \
          (one line an item; rows are named by the first eight digits of their `id`).",
     );
+}
+
+fn estimator_words(estimators: Estimators) -> &'static str {
+    match estimators {
+        Estimators::Unbiased => "unbiased estimator of light",
+        Estimators::Sheet => "sheet estimator of light",
+        Estimators::Both => {
+            "unbiased estimator of light, and where a light is picked among several the sheet's shortcut too"
+        }
+    }
 }
 
 /// How to read the numbers.
