@@ -242,7 +242,9 @@ impl Backend for Lab {
             let mut passes = (0..).zip(request.variant.passes(request.spp));
             let (number, asked) = passes.next().expect("an image takes a pass at least");
             let first = pass(number, asked)?;
-            passes.try_fold(first, |done, (number, asked)| Ok(joined(done, pass(number, asked)?))).map(|(image, _)| image)
+            passes
+                .try_fold(first, |done, (number, asked)| Ok(joined(done, pass(number, asked)?)))
+                .map(|(image, _)| image)
         })
     }
 

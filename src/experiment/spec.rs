@@ -428,7 +428,8 @@ mod tests {
 
     #[test]
     fn stability_means_all_scenes_and_samplers_where_it_names_none() {
-        let with = |entry: &str| read(&SMALL.replacen('{', &format!("{{\"stability\": {entry},"), 1)).unwrap().stability;
+        let with =
+            |entry: &str| read(&SMALL.replacen('{', &format!("{{\"stability\": {entry},"), 1)).unwrap().stability;
         let stability = with("{\"spp\": 64}").unwrap();
         assert_eq!(stability.scenes, ["pots", "box"]);
         assert_eq!(stability.samplers, ["uniform", "ld:sheet"]);
@@ -487,7 +488,11 @@ mod tests {
         ("[1, 4]", "[4, 4.0]", "spp[1]: expected each entry once"),
         ("\"replicates\": 3", "\"replicates\": 0", "replicates: expected a whole number from 1"),
         ("\"spp\": 64}", "\"spp\": 0}", "reference.spp: expected a whole number"),
-        ("\"seed\": ", "\"estimator\": \"sheat\", \"seed\": ", "estimator: expected \"unbiased\" or \"sheet\" or \"both\", found"),
+        (
+            "\"seed\": ",
+            "\"estimator\": \"sheat\", \"seed\": ",
+            "estimator: expected \"unbiased\" or \"sheet\" or \"both\", found",
+        ),
         (
             "\"scene\": \"pots\"",
             "\"scene\": \"pot\"",

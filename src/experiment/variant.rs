@@ -90,7 +90,8 @@ mod tests {
         for variant in Variant::COMPARED.into_iter().chain([Variant::Plain]) {
             assert_eq!(Variant::from_word(&variant.to_string()), Some(variant));
         }
-        for bad in ["", "Plain", "scaled", "scaled(1e)", "scaled(1e+6)", "scaled(1e06)", "scaled(1e6", "scaled(1e999)"] {
+        for bad in ["", "Plain", "scaled", "scaled(1e)", "scaled(1e+6)", "scaled(1e06)", "scaled(1e6", "scaled(1e999)"]
+        {
             assert_eq!(Variant::from_word(bad), None, "{bad}");
         }
     }

@@ -12,6 +12,7 @@ pub mod pareto;
 pub mod pictures;
 pub mod plots;
 pub mod provenance;
+pub mod stability;
 pub mod style;
 pub mod summarise;
 pub mod tables;

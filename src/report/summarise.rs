@@ -3,14 +3,19 @@
 //! Pure: the same rows give the same summary. What the experiment asks for and the rows do not hold is counted in
 //! [`Summary::missing`], never guessed.
 
+mod variants;
+
 use std::collections::HashMap;
 
-use crate::experiment::results::{About, Count, EnsembleRow, ImageRow, Kind, PointsRow, ReferenceRow, Row, Timing};
+use crate::experiment::results::{
+    About, Count, EnsembleRow, Estimator, ImageRow, Kind, PointsRow, ReferenceRow, Row, Timing, TwinDifference, Variant,
+};
 use crate::experiment::spec::Experiment;
 use crate::sampling::{Decision, Order, Points, Preset, Random, SamplerSpec, Scope};
 use crate::stats::{Estimate, SlopeFit, slope_with_interval, t_interval};
 
 use super::evidence::{Course, ratio, ratio_of_roots};
+pub use variants::Subject;
 
 /// Counts that a slope of RMSE is fitted over: powers of two from 4 to 256 that the sampler takes as asked.
 pub const SLOPE_COUNTS: std::ops::RangeInclusive<u32> = 4..=256;
@@ -31,6 +36,10 @@ pub struct Summary {
     pub cells: Vec<Cell>,
     /// By scene and sampler.
     pub slopes: Vec<Slope>,
+    /// By scene and sampler, where stability is asked about.
+    pub stability: Vec<Subject>,
+    /// The sheet's shortcut, by scene, sampler and count, where it is asked for beside the unbiased estimator.
+    pub shortcut: Vec<Cell>,
     /// By sampler and number of points.
     pub point_sets: Vec<PointSet>,
     /// The pictures, in the order of the samplers.
@@ -132,6 +141,8 @@ pub struct Cell {
     pub replicate_mean: Vec<f64>,
     /// Digest of each replicate's pixels.
     pub pixels: Vec<String>,
+    /// What differs between each replicate and its twin, where it is another making of an image.
+    pub twins: Vec<TwinDifference>,
 }
 
 impl Cell {
@@ -261,14 +272,29 @@ impl Summary {
     /// Where the error of a sampler goes between the [`course_counts`](Self::course_counts).
     pub fn course(&self, scene: usize, sampler: usize) -> Option<Course> {
         let (from, to) = self.course_counts()?;
-        let (from, to) = (self.cell(scene, sampler, from)?, self.cell(scene, sampler, to)?);
-        Some(Course {
-            rmse_ratio: ratio_of_roots(&to.mse, &from.mse)?,
-            independent: (f64::from(from.spp.taken) / f64::from(to.spp.taken)).sqrt(),
-            bias2: to.bias2,
-            bias2_ratio: ratio(&to.bias2, &from.bias2),
-        })
+        course(self.cell(scene, sampler, from)?, self.cell(scene, sampler, to)?)
     }
+
+    /// The sheet's shortcut in a scene, by a sampler, with a count asked for.
+    pub fn shortcut_cell(&self, scene: usize, sampler: usize, asked: u32) -> Option<&Cell> {
+        self.shortcut.iter().find(|c| c.scene == scene && c.sampler == sampler && c.spp.asked == asked)
+    }
+
+    /// Where the error of the sheet's shortcut goes between the [`course_counts`](Self::course_counts).
+    pub fn shortcut_course(&self, scene: usize, sampler: usize) -> Option<Course> {
+        let (from, to) = self.course_counts()?;
+        course(self.shortcut_cell(scene, sampler, from)?, self.shortcut_cell(scene, sampler, to)?)
+    }
+}
+
+/// Where an error goes from one count to a higher one.
+fn course(from: &Cell, to: &Cell) -> Option<Course> {
+    Some(Course {
+        rmse_ratio: ratio_of_roots(&to.mse, &from.mse)?,
+        independent: (f64::from(from.spp.taken) / f64::from(to.spp.taken)).sqrt(),
+        bias2: to.bias2,
+        bias2_ratio: ratio(&to.bias2, &from.bias2),
+    })
 }
 
 /// Gathers what the rows say of the experiment in `about`.
@@ -276,7 +302,7 @@ impl Summary {
 /// Of rows that stand for the same thing the last one counts. Timings are kept apart: nothing but
 /// [`Summary::speeds`] comes from them.
 pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
-    let index = Index::new(rows);
+    let index = Index::new(rows, about.experiment.estimator.primary());
     let samplers = samplers(&about.experiment);
     let mut summary = Summary {
         about: about.clone(),
@@ -284,6 +310,8 @@ pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
         samplers,
         cells: Vec::new(),
         slopes: Vec::new(),
+        stability: Vec::new(),
+        shortcut: Vec::new(),
         point_sets: Vec::new(),
         pictures: Vec::new(),
         picture_reference: None,
@@ -293,6 +321,8 @@ pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
     };
     index.add_cells(&mut summary);
     add_slopes(&mut summary);
+    index.add_stability(&mut summary);
+    index.add_shortcut(&mut summary);
     index.add_points(&mut summary);
     index.add_pictures(&mut summary);
     index.add_speeds(&mut summary, timings);
@@ -301,8 +331,12 @@ pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
 
 /// The experiment's samplers, texts that mean the same one together.
 fn samplers(experiment: &Experiment) -> Vec<SamplerSummary> {
+    samplers_of(&experiment.samplers)
+}
+
+fn samplers_of(texts: &[String]) -> Vec<SamplerSummary> {
     let mut samplers: Vec<SamplerSummary> = Vec::new();
-    for text in &experiment.samplers {
+    for text in texts {
         let spec = SamplerSpec::parse(text, Preset::Best).ok();
         let canonical = spec.map_or_else(|| text.clone(), |spec| spec.to_string());
         match samplers.iter_mut().find(|known| known.canonical == canonical) {
@@ -328,22 +362,28 @@ fn label(names: &[String]) -> String {
     }
 }
 
+/// Scene, sampler, count asked for, estimator and variant.
+type EnsembleKey<'a> = (&'a str, &'a str, u32, &'static str, Variant);
+
 /// Rows by what they stand for.
 struct Index<'a> {
     images: HashMap<&'a str, &'a ImageRow>,
     references: HashMap<&'a str, &'a ReferenceRow>,
-    ensembles: HashMap<(&'a str, &'a str, u32), &'a EnsembleRow>,
+    ensembles: HashMap<EnsembleKey<'a>, &'a EnsembleRow>,
+    /// The estimator that samplers are compared with.
+    primary: Estimator,
     points: HashMap<(&'a str, u32), Vec<&'a PointsRow>>,
     pictures: Vec<&'a ImageRow>,
     stages: Vec<ImageRow>,
 }
 
 impl<'a> Index<'a> {
-    fn new(rows: &'a [Row]) -> Self {
+    fn new(rows: &'a [Row], primary: Estimator) -> Self {
         let mut index = Self {
             images: HashMap::new(),
             references: HashMap::new(),
             ensembles: HashMap::new(),
+            primary,
             points: HashMap::new(),
             pictures: Vec::new(),
             stages: Vec::new(),
@@ -351,7 +391,11 @@ impl<'a> Index<'a> {
         for row in rows {
             match row {
                 Row::Reference(row) => drop(index.references.insert(&row.id, row)),
-                Row::Ensemble(row) => drop(index.ensembles.insert((&row.scene, &row.sampler, row.spp.asked), row)),
+                Row::Ensemble(row) => {
+                    let key =
+                        (row.scene.as_str(), row.sampler.as_str(), row.spp.asked, row.estimator.name(), row.variant);
+                    index.ensembles.insert(key, row);
+                }
                 Row::Points(row) => {
                     let sets = index.points.entry((&row.sampler, row.n.asked)).or_default();
                     sets.retain(|other| other.replicate != row.replicate);
@@ -375,6 +419,22 @@ impl<'a> Index<'a> {
         }
         index.points.values_mut().for_each(|sets| sets.sort_by_key(|row| row.replicate));
         index
+    }
+
+    /// The ensemble that samplers are compared by.
+    fn plain(&self, s: &SceneSummary, p: &SamplerSummary, asked: u32) -> Option<&'a EnsembleRow> {
+        self.ensemble(s, p, asked, self.primary, Variant::Plain)
+    }
+
+    fn ensemble(
+        &self,
+        s: &SceneSummary,
+        p: &SamplerSummary,
+        asked: u32,
+        estimator: Estimator,
+        variant: Variant,
+    ) -> Option<&'a EnsembleRow> {
+        self.ensembles.get(&(s.name.as_str(), p.canonical.as_str(), asked, estimator.name(), variant)).copied()
     }
 
     /// Scene `i` with the reference that its ensembles were compared with.
@@ -404,7 +464,7 @@ impl<'a> Index<'a> {
             for sampler in 0..summary.samplers.len() {
                 for &asked in &summary.about.experiment.spp {
                     let (s, p) = (&summary.scenes[scene], &summary.samplers[sampler]);
-                    match self.ensembles.get(&(s.name.as_str(), p.canonical.as_str(), asked)) {
+                    match self.plain(s, p, asked) {
                         Some(row) => summary.cells.push(self.cell(row, scene, sampler, s, p)),
                         None => {
                             missing += 1;
@@ -452,6 +512,7 @@ impl<'a> Index<'a> {
             replicate_mse: members.iter().filter_map(|m| m.errors.as_ref()).map(|e| e.mse_unbiased).collect(),
             replicate_mean: members.iter().map(|m| m.mean).collect(),
             pixels: members.iter().map(|m| m.pixels.clone()).collect(),
+            twins: members.iter().filter_map(|m| m.twin.clone()).collect(),
         }
     }
 
@@ -503,8 +564,7 @@ impl<'a> Index<'a> {
         let by_id: HashMap<&str, &Timing> = timings.iter().map(|timing| (timing.id.as_str(), timing)).collect();
         for cell in &summary.cells {
             let (s, p) = (&summary.scenes[cell.scene], &summary.samplers[cell.sampler]);
-            let key = (s.name.as_str(), p.canonical.as_str(), cell.spp.asked);
-            let members = self.ensembles.get(&key).into_iter().flat_map(|row| &row.members);
+            let members = self.plain(s, p, cell.spp.asked).into_iter().flat_map(|row| &row.members);
             let timed: Vec<&Timing> = members.filter_map(|id| by_id.get(id.as_str()).copied()).collect();
             let Some(seconds) = median(timed.iter().map(|timing| timing.seconds).collect()) else { continue };
             let threads = timed.iter().map(|timing| timing.threads).max().unwrap_or(1);

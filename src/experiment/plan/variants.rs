@@ -36,8 +36,7 @@ pub(super) fn probed_samplers(
             let names: Vec<&str> = samplers.iter().flat_map(|sampler| &sampler.names).map(String::as_str).collect();
             let near = did_you_mean(text, names.iter().copied());
             let near = near.map(|near| format!("; did you mean {near:?}?")).unwrap_or_default();
-            let what =
-                format!("expected one of the experiment's samplers {}, found {text:?}{near}", names.join(" "));
+            let what = format!("expected one of the experiment's samplers {}, found {text:?}{near}", names.join(" "));
             return Err(Error::input(format!("{}: {key}", experiment.place), what));
         }
         if !probed.contains(&canonical) {
@@ -49,7 +48,13 @@ pub(super) fn probed_samplers(
 
 impl Planner<'_> {
     /// The counts of the experiment, and where a light is picked, if that is asked for, the sheet's shortcut beside each.
-    pub(super) fn add_shortcut_of(&mut self, scene: &SceneFacts, size: Size, sampler: &PlannedSampler, reference_id: &str) {
+    pub(super) fn add_shortcut_of(
+        &mut self,
+        scene: &SceneFacts,
+        size: Size,
+        sampler: &PlannedSampler,
+        reference_id: &str,
+    ) {
         let estimators = self.experiment.estimator;
         let primary = estimators.primary();
         for &asked in &self.experiment.spp {
@@ -63,7 +68,13 @@ impl Planner<'_> {
     }
 
     /// What should make no difference: a sample more or less, another unit of length, two passes.
-    pub(super) fn add_stability_of(&mut self, scene: &SceneFacts, size: Size, sampler: &PlannedSampler, reference_id: &str) {
+    pub(super) fn add_stability_of(
+        &mut self,
+        scene: &SceneFacts,
+        size: Size,
+        sampler: &PlannedSampler,
+        reference_id: &str,
+    ) {
         let Some(stability) = &self.experiment.stability else { return };
         let estimator = self.experiment.estimator.primary();
         let plain = Making { asked: stability.spp, estimator, variant: Variant::Plain };

@@ -22,7 +22,9 @@ mod identical;
 mod opening;
 mod pictures;
 mod points;
+mod shortcut;
 mod speed;
+mod stability;
 mod words;
 
 use super::markdown::Page;
@@ -39,6 +41,8 @@ mod titles {
     pub const BIAS: &str = "Bias and variance";
     pub const SPEED: &str = "Speed against accuracy";
     pub const FAILURES: &str = "Where methods fail";
+    pub const STABILITY: &str = "Stability";
+    pub const SHORTCUT: &str = "The sheet's shortcut";
     pub const TABLE: &str = "Advantages and disadvantages";
     pub const LIMITS: &str = "Limits";
 }
@@ -64,7 +68,9 @@ pub fn report(summary: &Summary, figures: &Figures) -> String {
     convergence::bias_and_variance(summary, figures, &mut page);
     pictures::strips(summary, figures, &mut page);
     speed::section(summary, figures, &mut page);
+    shortcut::section(summary, &mut page);
     failures::section(summary, &mut page);
+    stability::section(summary, &mut page);
     failures::table(summary, &mut page);
     failures::limits(summary, &mut page);
     page.finish()

@@ -1,0 +1,372 @@
+//! How each sampler bears what should make no difference: a sample more or less, another randomisation, another unit of
+//! length, two passes.
+
+use crate::experiment::results::Variant;
+
+use super::super::markdown::Page;
+use super::super::numbers::{counted, listed, percent, short};
+use super::super::stability::{
+    Against, Differences, FALSE_ALARM, LEAST, MARGIN, ROUNDING, ScaleVerdict, SpreadVerdict, Stretch, Verdict, WIDE,
+    count_against, differences, passes_against, remade_ratio, scale_verdict, spread,
+};
+use super::super::summarise::{Cell, Subject, Summary};
+use super::titles;
+use super::words::{name, ratio_cell, rows, scene_name, times};
+
+/// The section, where the experiment asks for it.
+pub fn section(summary: &Summary, page: &mut Page) {
+    let Some(asked) = &summary.about.experiment.stability else { return };
+    page.heading(2, titles::STABILITY);
+    if summary.stability.is_empty() {
+        page.paragraph("There are no rows yet to tell of stability.");
+        return;
+    }
+    let stretch = Stretch::of(summary);
+    page.paragraph(&format!(
+        "What should make no difference, held against {} spp. Intervals are 95 % ones; a verdict on an error asks for more: {} are judged below, and each \
+         interval is stretched by {} (on a logarithmic scale), so that all of them together call a difference that is not there with a chance of at most {}. \
+         *Worse*: above what is promised by more than {} with the whole stretched interval; *stable*: above it by at most {}, likewise; all else is *cannot tell*.",
+        asked.spp,
+        counted(stretch.comparisons, "ratio of errors", "ratios of errors"),
+        short(stretch.factor),
+        percent(FALSE_ALARM),
+        percent(LEAST - 1.0),
+        percent(MARGIN - 1.0),
+    ));
+    counts(summary, &stretch, page);
+    replicates(summary, page);
+    scales(summary, page);
+    passes(summary, &stretch, page);
+}
+
+/// The subjects scene by scene.
+fn by_scene(summary: &Summary) -> Vec<(usize, Vec<&Subject>)> {
+    let of = |scene: usize| summary.stability.iter().filter(|subject| subject.scene == scene).collect::<Vec<_>>();
+    (0..summary.scenes.len()).map(|scene| (scene, of(scene))).filter(|(_, subjects)| !subjects.is_empty()).collect()
+}
+
+/// Samplers under the words that fit them, as one sentence about a scene; words in the order in which they are given.
+fn told(at: &str, groups: &[(String, Vec<String>)]) -> String {
+    let parts = groups.iter().filter(|(_, members)| !members.is_empty());
+    let parts: Vec<String> = parts.map(|(words, members)| format!("{words}: {}", listed(members))).collect();
+    format!("In {at}, {}.", parts.join("; "))
+}
+
+// --- a sample more or less ---
+
+/// What a count is to the base, in the words of a verdict.
+fn way_of(base: u32, asked: u32) -> String {
+    match asked {
+        n if n + 1 == base => "with a sample less".to_owned(),
+        n if n == base + 1 => "with a sample more".to_owned(),
+        n => format!("at {n} spp"),
+    }
+}
+
+fn counts(summary: &Summary, stretch: &Stretch, page: &mut Page) {
+    let Some(asked) = summary.about.experiment.stability.as_ref() else { return };
+    page.heading(3, "A sample more or less");
+    page.paragraph(&format!(
+        "RMSE over that at {} spp. Promised: for fewer or many more samples the power of the counts taken that the sampler's own slope says (−1/2 where none was \
+         fitted), with the slope's interval; that a sample more does no harm. Where a sampler takes another count than asked, it is judged by what it took.",
+        asked.spp
+    ));
+    for (scene, subjects) in by_scene(summary) {
+        let mut head = vec![format!("in {}", scene_name(summary, scene))];
+        head.extend(asked.counts().iter().map(|n| format!("{n} / {} spp", asked.spp)));
+        head.push("verdict".to_owned());
+        let lines: Vec<Vec<String>> = subjects
+            .iter()
+            .map(|subject| {
+                let cells = subject.counts.iter().map(|cell| count_cell(summary, subject, cell));
+                let verdict = count_words(summary, stretch, subject);
+                std::iter::once(name(summary, subject.sampler)).chain(cells).chain([verdict]).collect()
+            })
+            .collect();
+        page.table(&head.iter().map(String::as_str).collect::<Vec<_>>(), &lines);
+        page.paragraph(&count_sentence(summary, stretch, scene, &subjects));
+    }
+}
+
+fn count_cell(summary: &Summary, subject: &Subject, cell: &Cell) -> String {
+    let text = match count_against(summary, subject, cell) {
+        None => "below noise".to_owned(),
+        Some(Against { ratio, promised, .. }) => format!("{} (promised {})", times(&ratio), short(promised.value)),
+    };
+    let base = subject.base.spp;
+    let other = |cell: &Cell| cell.spp.taken != cell.spp.asked;
+    match (other(cell), other(&subject.base)) {
+        (false, false) => text,
+        (true, false) => format!("{text}, {} taken", cell.spp.taken),
+        (_, true) => format!("{text}, {} against {} taken", cell.spp.taken, base.taken),
+    }
+}
+
+/// Each count's verdict.
+fn count_verdicts(summary: &Summary, stretch: &Stretch, subject: &Subject) -> Vec<Verdict> {
+    let verdict = |cell: &Cell| count_against(summary, subject, cell).map(|against| stretch.judge(&against.excess));
+    subject.counts.iter().map(|cell| verdict(cell).unwrap_or(Verdict::CannotTell)).collect()
+}
+
+/// "worse with a sample more", "stable", "cannot tell".
+fn count_words(summary: &Summary, stretch: &Stretch, subject: &Subject) -> String {
+    let verdicts = count_verdicts(summary, stretch, subject);
+    let is_worse = |(_, verdict): &(&Cell, &Verdict)| **verdict == Verdict::Worse;
+    let worse = subject.counts.iter().zip(&verdicts).filter(is_worse);
+    let worse: Vec<String> = worse.map(|(cell, _)| way_of(subject.base.spp.asked, cell.spp.asked)).collect();
+    if !worse.is_empty() {
+        return format!("worse {}", listed(&worse));
+    }
+    if verdicts.iter().all(|&verdict| verdict == Verdict::Stable) { "stable" } else { "cannot tell" }.to_owned()
+}
+
+/// Who is worse at which count and by how much, who is stable, of whom it cannot be told.
+fn count_sentence(summary: &Summary, stretch: &Stretch, scene: usize, subjects: &[&Subject]) -> String {
+    let Some(asked) = summary.about.experiment.stability.as_ref() else { return String::new() };
+    let mut groups: Vec<(String, Vec<String>)> = Vec::new();
+    for (i, &count) in asked.counts().iter().enumerate() {
+        let worse = subjects.iter().filter(|s| count_verdicts(summary, stretch, s)[i] == Verdict::Worse);
+        let members = worse.filter_map(|subject| {
+            let against = count_against(summary, subject, &subject.counts[i])?;
+            let (who, times, rows) =
+                (name(summary, subject.sampler), times(&against.excess), rows(&[&subject.counts[i], &subject.base]));
+            Some(format!("{who} (by a factor of {times} over what is promised {rows})"))
+        });
+        groups.push((format!("worse {}", way_of(asked.spp, count)), members.collect()));
+    }
+    for (words, word) in [("stable at every count", "stable"), ("cannot tell", "cannot tell")] {
+        let members = subjects.iter().filter(|subject| count_words(summary, stretch, subject) == word);
+        groups.push((words.to_owned(), members.map(|subject| name(summary, subject.sampler)).collect()));
+    }
+    told(&scene_name(summary, scene), &groups)
+}
+
+// --- replicates ---
+
+fn replicates(summary: &Summary, page: &mut Page) {
+    page.heading(3, "From one randomisation to the next");
+    let n = summary.about.experiment.replicates;
+    if n < 2 {
+        page.paragraph("One replicate: nothing can be said of their spread.");
+        return;
+    }
+    page.paragraph(&format!(
+        "Worst, best and median RMSE of {n} replicates. The range of {n} holds the median of all possible ones with probability 1 − 2^(1 − {n}) = {}; one more replicate is worse than the \
+         worst of them with probability 1/{}. *Narrow*: worst / best is at most {WIDE}, so the worst is at most that many times the true median wherever the range holds it; \
+         *wide*: the worst is more than {WIDE} times that order statistic which the true median exceeds with a chance of at most 5 % (a line; none below 5 replicates).",
+        percent_of_certainty(n),
+        n + 1
+    ));
+    let word = |verdict: SpreadVerdict| match verdict {
+        SpreadVerdict::Narrow => "narrow",
+        SpreadVerdict::Wide => "wide",
+        SpreadVerdict::CannotTell => "cannot tell",
+    };
+    let of = |subject: &Subject| spread(&subject.base);
+    let lines: Vec<Vec<String>> = summary
+        .stability
+        .iter()
+        .map(|subject| {
+            let numbers = match of(subject) {
+                _ if subject.base.is_fixed => ["–", "–", "–", "nothing random"].map(str::to_owned),
+                None => ["–", "–", "–", "cannot tell"].map(str::to_owned),
+                Some(s) => [short(s.median), short(s.worst), short(s.best), word(s.verdict).to_owned()],
+            };
+            [scene_name(summary, subject.scene), name(summary, subject.sampler)].into_iter().chain(numbers).collect()
+        })
+        .collect();
+    page.table(&["scene", "sampler", "median RMSE", "worst / median", "best / median", "spread"], &lines);
+    let items: Vec<String> = by_scene(summary)
+        .iter()
+        .map(|(scene, subjects)| {
+            let random: Vec<&&Subject> = subjects.iter().filter(|subject| !subject.base.is_fixed).collect();
+            let members = |verdict: SpreadVerdict| {
+                let is_it =
+                    |s: &&&&Subject| of(s).map_or(SpreadVerdict::CannotTell, |spread| spread.verdict) == verdict;
+                random.iter().filter(is_it).map(|subject| name(summary, subject.sampler)).collect::<Vec<_>>()
+            };
+            let groups = [
+                ("the spread is wide".to_owned(), members(SpreadVerdict::Wide)),
+                ("narrow".to_owned(), members(SpreadVerdict::Narrow)),
+                ("cannot tell".to_owned(), members(SpreadVerdict::CannotTell)),
+                (
+                    "nothing random".to_owned(),
+                    subjects.iter().filter(|s| s.base.is_fixed).map(|s| name(summary, s.sampler)).collect(),
+                ),
+            ];
+            told(&scene_name(summary, *scene), &groups)
+        })
+        .collect();
+    page.bullets(&items);
+}
+
+/// 1 − 2^(1 − n) with as many nines as it has.
+fn percent_of_certainty(n: u32) -> String {
+    let miss = libm::pow(2.0, 1.0 - f64::from(n));
+    if miss < 5e-4 { format!("1 − {}", short(miss)) } else { format!("{:.1} %", 100.0 * (1.0 - miss)) }
+}
+
+// --- another unit of length ---
+
+fn scale_word(verdict: ScaleVerdict) -> &'static str {
+    match verdict {
+        ScaleVerdict::Same => "bit for bit the same",
+        ScaleVerdict::Unchanged => "unchanged beyond rounding",
+        ScaleVerdict::Changed => "changed",
+        ScaleVerdict::CannotTell => "cannot tell",
+    }
+}
+
+/// The scaled makings of a subject.
+fn scaled(subject: &Subject) -> impl Iterator<Item = (i8, &Cell)> {
+    subject.remade.iter().filter_map(|(variant, cell)| match variant {
+        Variant::Scaled(power) => Some((*power, cell)),
+        _ => None,
+    })
+}
+
+fn scales(summary: &Summary, page: &mut Page) {
+    page.heading(3, "In another unit of length");
+    page.paragraph(&format!(
+        "The scene with all lengths (mesh, camera, lens, focus) multiplied, the same seeds: radiance does not depend on the unit of length, so nothing but roundings may change. A rounding may \
+         move a ray across an edge, so single samples may differ; *unchanged beyond rounding* if no replicate's image moves by a root mean square of more than {} of its RMSE, so that the RMSE cannot \
+         change by more either. Pixels that differ (in any bit), the largest difference over the mean radiance and the root mean square difference over the RMSE are the worst of all replicates.",
+        percent(ROUNDING)
+    ));
+    let mut lines = Vec::new();
+    for subject in &summary.stability {
+        for (power, cell) in scaled(subject) {
+            let d = differences(&subject.base, &cell.twins);
+            let of = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
+            lines.push(vec![
+                scene_name(summary, subject.scene),
+                name(summary, subject.sampler),
+                format!("1e{power}").replace('-', "−"),
+                ratio_cell(remade_ratio(&subject.base, cell)),
+                of(d.map(|d| percent(d.differing))),
+                of(d.map(|d| short(d.largest))),
+                of(d.and_then(|d| d.rms).map(short)),
+                scale_word(scale_verdict(&subject.base, cell)).to_owned(),
+            ]);
+        }
+    }
+    let head = [
+        "scene",
+        "sampler",
+        "lengths times",
+        "RMSE / as it is",
+        "pixels that differ",
+        "largest difference / mean",
+        "RMS difference / RMSE",
+        "verdict",
+    ];
+    page.table(&head, &lines);
+    page.bullets(
+        &by_scene(summary)
+            .iter()
+            .map(|(scene, subjects)| scale_sentence(summary, *scene, subjects))
+            .collect::<Vec<_>>(),
+    );
+}
+
+fn scale_sentence(summary: &Summary, scene: usize, subjects: &[&Subject]) -> String {
+    let verdicts = [ScaleVerdict::Changed, ScaleVerdict::Unchanged, ScaleVerdict::Same, ScaleVerdict::CannotTell];
+    let groups: Vec<(String, Vec<String>)> = verdicts
+        .into_iter()
+        .map(|verdict| {
+            let members = subjects.iter().filter_map(|subject| {
+                let powers: Vec<String> = scaled(subject)
+                    .filter(|(_, cell)| scale_verdict(&subject.base, cell) == verdict)
+                    .map(|(power, _)| format!("1e{power}").replace('-', "−"))
+                    .collect();
+                (!powers.is_empty()).then(|| format!("{} (× {})", name(summary, subject.sampler), listed(&powers)))
+            });
+            (scale_word(verdict).to_owned(), members.collect())
+        })
+        .collect();
+    told(&scene_name(summary, scene), &groups)
+}
+
+// --- two passes ---
+
+/// The subject made in two passes.
+fn in_passes(subject: &Subject) -> Option<&Cell> {
+    subject.remade.iter().find(|(variant, _)| *variant == Variant::TwoPasses).map(|(_, cell)| cell)
+}
+
+fn passes(summary: &Summary, stretch: &Stretch, page: &mut Page) {
+    let Some(asked) = summary.about.experiment.stability.as_ref() else { return };
+    if asked.spp < 2 {
+        return;
+    }
+    page.heading(3, "Two passes");
+    page.paragraph(&format!(
+        "The driver of the sheet's framework makes a first pass of 1 sample and a second of {}, in which the samplers begin anew: a deterministic sequence repeats its first point, a randomised one \
+         draws another randomisation, and a set made for {} points is replaced by one for {}. The mean, weighted by the samples taken, against one pass of {}; promised is what the samples taken are worth.",
+        asked.spp - 1,
+        asked.spp,
+        asked.spp - 1,
+        asked.spp
+    ));
+    let lines: Vec<Vec<String>> = summary
+        .stability
+        .iter()
+        .filter_map(|subject| {
+            let cell = in_passes(subject)?;
+            let against = passes_against(summary, subject, cell);
+            let equal = differences(&subject.base, &cell.twins)
+                .map_or("–".to_owned(), |Differences { same, .. }| format!("{same} of {}", cell.twins.len()));
+            let taken = match (cell.spp.taken, subject.base.spp.taken) {
+                (two, one) if two == one => two.to_string(),
+                (two, one) => format!("{two} against {one}"),
+            };
+            Some(vec![
+                scene_name(summary, subject.scene),
+                name(summary, subject.sampler),
+                taken,
+                ratio_cell(against.map(|against| against.ratio)),
+                against.map_or("–".to_owned(), |against| short(against.promised.value)),
+                equal,
+                pass_word(pass_verdict(summary, stretch, subject)).to_owned(),
+            ])
+        })
+        .collect();
+    let head =
+        ["scene", "sampler", "samples taken", "RMSE in two / in one", "promised", "bit for bit equal", "verdict"];
+    page.table(&head, &lines);
+    let items: Vec<String> =
+        by_scene(summary).iter().map(|(scene, subjects)| pass_sentence(summary, stretch, *scene, subjects)).collect();
+    page.bullets(&items);
+}
+
+fn pass_verdict(summary: &Summary, stretch: &Stretch, subject: &Subject) -> Verdict {
+    let against = in_passes(subject).and_then(|cell| passes_against(summary, subject, cell));
+    against.map_or(Verdict::CannotTell, |against| stretch.judge(&against.excess))
+}
+
+fn pass_word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Worse => "worse in two passes",
+        Verdict::Stable => "stable",
+        Verdict::CannotTell => "cannot tell",
+    }
+}
+
+fn pass_sentence(summary: &Summary, stretch: &Stretch, scene: usize, subjects: &[&Subject]) -> String {
+    let groups: Vec<(String, Vec<String>)> = [Verdict::Worse, Verdict::Stable, Verdict::CannotTell]
+        .into_iter()
+        .map(|verdict| {
+            let members = subjects.iter().filter(|subject| pass_verdict(summary, stretch, subject) == verdict);
+            let members = members.map(|subject| {
+                let who = name(summary, subject.sampler);
+                let cell = in_passes(subject).filter(|_| verdict == Verdict::Worse);
+                let against = cell.and_then(|cell| Some((cell, passes_against(summary, subject, cell)?)));
+                against.map_or(who.clone(), |(cell, against)| {
+                    format!("{who} ({} {})", times(&against.ratio), rows(&[cell, &subject.base]))
+                })
+            });
+            (pass_word(verdict).to_owned(), members.collect())
+        })
+        .collect();
+    told(&scene_name(summary, scene), &groups)
+}
