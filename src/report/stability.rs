@@ -8,7 +8,9 @@ use crate::stats::moments::student_t_quantile;
 use crate::stats::{Estimate, Moments};
 
 use super::evidence::{paired_ratio_of_roots, ratio, ratio_of_roots};
+use super::provenance;
 use super::summarise::{Cell, Subject, Summary};
+use super::tables::{estimate_fields, quoted};
 
 /// Chance that any comparison of the section calls a difference that is not there.
 pub const FALSE_ALARM: f64 = 0.05;
@@ -35,6 +37,17 @@ pub enum Verdict {
     Worse,
     /// The stretched interval holds both, or there is none.
     CannotTell,
+}
+
+impl Verdict {
+    /// The word for it in tables.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Stable => "stable",
+            Self::Worse => "worse",
+            Self::CannotTell => "cannot tell",
+        }
+    }
 }
 
 /// One RMSE against the base's.
@@ -101,9 +114,8 @@ pub fn promised(summary: &Summary, subject: &Subject, cell: &Cell) -> Estimate {
         let (a, b) = (at(low), at(high));
         [a.min(b), a.max(b)]
     });
-    // A slope without an interval is a point on a line: it promises what it says.
-    let value = at(fit.slope);
-    Estimate { value, ci95: ci95.or(Some([value; 2])) }
+    // A line through two points has no interval: nothing can be told by what it promises.
+    Estimate { value: at(fit.slope), ci95 }
 }
 
 fn exactly(value: f64) -> Estimate {
@@ -143,6 +155,18 @@ pub enum ScaleVerdict {
     Changed,
     /// The error that the difference is held against is below the reference's noise, or rows are missing.
     CannotTell,
+}
+
+impl ScaleVerdict {
+    /// The word for it in tables.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Same => "bit for bit the same",
+            Self::Unchanged => "unchanged beyond rounding",
+            Self::Changed => "changed",
+            Self::CannotTell => "cannot tell",
+        }
+    }
 }
 
 /// Differences of all replicates from their twins, the worst of each.
@@ -241,6 +265,70 @@ fn median_is_below(n: usize) -> Option<usize> {
         log_share += libm::log(k as f64 / (n - k + 1) as f64);
     }
     rank
+}
+
+/// `stability.csv`: one line a scene, sampler and comparison with the base, below one line of provenance. Intervals are 95 %
+/// ones, not stretched; empty fields stand for what cannot be had or does not apply.
+pub fn csv(summary: &Summary) -> String {
+    let mut text = format!("# {}\n", provenance::line(&summary.about));
+    text += "scene,sampler,stands_for,variant,row,base_row,spp_asked,spp_taken,rmse_ratio,rmse_ratio_low,rmse_ratio_high,promised,promised_low,promised_high,\
+             pixels_that_differ,largest_difference_over_mean,rms_difference_over_rmse,verdict\n";
+    let stretch = Stretch::of(summary);
+    for subject in &summary.stability {
+        for cell in &subject.counts {
+            let against = count_against(summary, subject, cell);
+            let verdict = against.map_or(Verdict::CannotTell, |against| stretch.judge(&against.excess)).word();
+            let numbers = (against.map(|against| against.ratio), against.map(|against| against.promised));
+            text += &csv_line(summary, subject, cell, Variant::Plain, numbers, verdict);
+        }
+        for (variant, cell) in &subject.remade {
+            let (numbers, verdict) = match variant {
+                Variant::TwoPasses => {
+                    let against = passes_against(summary, subject, cell);
+                    let verdict = against.map_or(Verdict::CannotTell, |against| stretch.judge(&against.excess)).word();
+                    ((against.map(|against| against.ratio), against.map(|against| against.promised)), verdict)
+                }
+                _ => ((remade_ratio(&subject.base, cell), None), scale_verdict(&subject.base, cell).word()),
+            };
+            text += &csv_line(summary, subject, cell, *variant, numbers, verdict);
+        }
+    }
+    text
+}
+
+fn csv_line(
+    summary: &Summary,
+    subject: &Subject,
+    cell: &Cell,
+    variant: Variant,
+    (ratio, promised): (Option<Estimate>, Option<Estimate>),
+    verdict: &str,
+) -> String {
+    let (scene, sampler) = (&summary.scenes[subject.scene], &summary.samplers[subject.sampler]);
+    let mut line = [
+        quoted(&scene.name),
+        quoted(&sampler.names.join(" = ")),
+        quoted(&sampler.canonical),
+        variant.to_string(),
+        cell.id.clone(),
+        subject.base.id.clone(),
+        cell.spp.asked.to_string(),
+        cell.spp.taken.to_string(),
+    ]
+    .join(",");
+    line += &estimate_fields(ratio.map(six_digits));
+    line += &estimate_fields(promised.map(six_digits));
+    let d = differences(&subject.base, &cell.twins);
+    for number in [d.map(|d| d.differing), d.map(|d| d.largest), d.and_then(|d| d.rms)] {
+        line += &format!(",{}", number.map(|number| number.to_string()).unwrap_or_default());
+    }
+    format!("{line},{verdict}\n")
+}
+
+/// An interval's ends to six digits, as all of them are written.
+fn six_digits(e: Estimate) -> Estimate {
+    let round = |x: f64| format!("{x:.5e}").parse().unwrap_or(x);
+    Estimate { ci95: e.ci95.map(|ends| ends.map(round)), ..e }
 }
 
 #[cfg(test)]

@@ -76,7 +76,7 @@ pub fn slopes_csv(summary: &Summary) -> String {
 }
 
 /// `,value,low,high`.
-fn estimate_fields(estimate: Option<Estimate>) -> String {
+pub(super) fn estimate_fields(estimate: Option<Estimate>) -> String {
     let field = |number: Option<f64>| number.map(|number| number.to_string()).unwrap_or_default();
     let ends = estimate.and_then(|estimate| estimate.ci95);
     format!(
@@ -92,7 +92,7 @@ fn six_digits(x: f64) -> f64 {
 }
 
 /// A field as RFC 4180 wants it.
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }
 

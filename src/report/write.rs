@@ -9,7 +9,7 @@ use crate::film::write_whole;
 
 use super::figure::{Figure, Rgb8};
 use super::summarise::{Summary, summarise};
-use super::{charts, pictured, provenance, sections, tables};
+use super::{charts, pictured, provenance, sections, stability, tables};
 
 /// What became of a figure.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -71,7 +71,8 @@ fn details_path(dir: &Path) -> PathBuf {
     dir.join("figures").join("details.txt")
 }
 
-/// Writes `report.md`, `summary.csv`, `slopes.csv` and `figures/` from the rows in `dir`.
+/// Writes `report.md`, `summary.csv`, `slopes.csv`, where it is asked about `stability.csv`, and `figures/` from the rows in
+/// `dir`.
 ///
 /// The same rows, timings and images give the same bytes; `summary.csv` and `slopes.csv` depend on rows alone.
 /// Figures of images that are not there keep their earlier file, and the report says so. Missing rows do not fail: the
@@ -88,6 +89,9 @@ pub fn write(dir: &Path) -> Result<Written> {
     let figures = draw(dir, &summary)?;
     write_whole(&dir.join("summary.csv"), tables::summary_csv(&summary).as_bytes())?;
     write_whole(&dir.join("slopes.csv"), tables::slopes_csv(&summary).as_bytes())?;
+    if !summary.stability.is_empty() {
+        write_whole(&dir.join("stability.csv"), stability::csv(&summary).as_bytes())?;
+    }
     let report = dir.join("report.md");
     write_whole(&report, sections::report(&summary, &figures).as_bytes())?;
     Ok(Written { report, summary, figures })

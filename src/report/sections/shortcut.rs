@@ -3,9 +3,9 @@
 use crate::experiment::spec::Estimators;
 use crate::stats::Estimate;
 
-use super::super::evidence::{Answer, Limit, above, below, is_biased, paired_ratio};
+use super::super::evidence::{Answer, Limit, clearly_above_one, is_biased, paired_ratio};
 use super::super::markdown::Page;
-use super::super::numbers::{estimate, listed, percent, short};
+use super::super::numbers::{estimate, listed, percent};
 use super::super::summarise::{Cell, Summary};
 use super::titles;
 use super::words::{estimate_cell, limit_words, name, ratio_cell, row, rows, scene_name};
@@ -130,9 +130,10 @@ fn sentence(summary: &Summary, scene: usize, pair: &Pair) -> String {
 fn brightness_words(ratio: Option<Estimate>) -> String {
     let Some(ratio) = ratio else { return "its brightness cannot be compared".to_owned() };
     let inverse = Estimate { value: 1.0 / ratio.value, ci95: ratio.ci95.map(|[low, high]| [1.0 / high, 1.0 / low]) };
-    match (below(&ratio, 1.0), above(&ratio, 1.0)) {
-        (Answer::Yes, _) => format!("darker by a factor of {}", estimate(&inverse)),
-        (_, Answer::Yes) => format!("brighter by a factor of {}", estimate(&ratio)),
-        _ => format!("its mean is {} of the unbiased one's: darker or not cannot be told", short(ratio.value)),
+    // By twice the interval's distance, as a bias is called.
+    match (clearly_above_one(&inverse), clearly_above_one(&ratio)) {
+        (true, _) => format!("darker by a factor of {}", estimate(&inverse)),
+        (_, true) => format!("brighter by a factor of {}", estimate(&ratio)),
+        _ => format!("its mean is {} of the unbiased one's, so whether it is darker cannot be told", estimate(&ratio)),
     }
 }

@@ -208,15 +208,6 @@ fn percent_of_certainty(n: u32) -> String {
 
 // --- another unit of length ---
 
-fn scale_word(verdict: ScaleVerdict) -> &'static str {
-    match verdict {
-        ScaleVerdict::Same => "bit for bit the same",
-        ScaleVerdict::Unchanged => "unchanged beyond rounding",
-        ScaleVerdict::Changed => "changed",
-        ScaleVerdict::CannotTell => "cannot tell",
-    }
-}
-
 /// The scaled makings of a subject.
 fn scaled(subject: &Subject) -> impl Iterator<Item = (i8, &Cell)> {
     subject.remade.iter().filter_map(|(variant, cell)| match variant {
@@ -246,7 +237,7 @@ fn scales(summary: &Summary, page: &mut Page) {
                 of(d.map(|d| percent(d.differing))),
                 of(d.map(|d| short(d.largest))),
                 of(d.and_then(|d| d.rms).map(short)),
-                scale_word(scale_verdict(&subject.base, cell)).to_owned(),
+                scale_verdict(&subject.base, cell).word().to_owned(),
             ]);
         }
     }
@@ -281,7 +272,7 @@ fn scale_sentence(summary: &Summary, scene: usize, subjects: &[&Subject]) -> Str
                     .collect();
                 (!powers.is_empty()).then(|| format!("{} (× {})", name(summary, subject.sampler), listed(&powers)))
             });
-            (scale_word(verdict).to_owned(), members.collect())
+            (verdict.word().to_owned(), members.collect())
         })
         .collect();
     told(&scene_name(summary, scene), &groups)
