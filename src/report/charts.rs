@@ -1,9 +1,11 @@
 //! The charts of a report, out of its summary.
 
+use crate::experiment::results::Variant;
 use crate::sampling::{Points, Preset, point_set};
 use crate::stats::Estimate;
 
 use super::bias_variance::{self, BiasVariance, Group, bias_variance_chart};
+use super::dots::{Dot, DotGroup, DotRow, dot_chart};
 use super::figure::{Figure, Rgb8};
 use super::frame::Frame;
 use super::numbers::{counted, listed};
@@ -11,7 +13,8 @@ use super::pareto::{Trial, pareto_chart};
 use super::pictures::{NamedPoints, point_set_contact_sheet};
 use super::plots::{Datum, Floor, Guide, Plot, Series, loglog_chart, small_multiples};
 use super::provenance;
-use super::summarise::Summary;
+use super::stability::{Against, count_against, passes_against};
+use super::summarise::{Subject, Summary};
 
 /// The points of the sheet's Figure 2.
 pub const FIGURE_2_POINTS: u32 = 1024;
@@ -149,6 +152,37 @@ pub fn bias_and_variance(summary: &Summary) -> Option<Figure> {
     let axes = ["squared radiance, mean over pixels and channels", ""];
     let title = format!("Bias² and variance at {most} spp");
     Some(bias_variance_chart(&frame(summary, &title, &subtitle, axes), &groups))
+}
+
+/// Every count and two passes against what is promised; `None` where stability is not asked about or nothing is there.
+pub fn stability(summary: &Summary) -> Option<Figure> {
+    let asked = summary.about.experiment.stability.as_ref().filter(|_| !summary.stability.is_empty())?;
+    let mut kinds: Vec<String> = asked.counts().iter().map(|n| format!("{n} spp")).collect();
+    let in_passes = kinds.len();
+    if asked.spp > 1 {
+        kinds.push(format!("1 + {} spp in two passes", asked.spp - 1));
+    }
+    let dot = |kind: usize, against: Option<Against>| {
+        let excess = against?.excess;
+        Some(Dot { kind, value: excess.value, interval: ends(&excess) })
+    };
+    let row = |subject: &Subject| {
+        let counts = subject.counts.iter().enumerate().map(|(i, cell)| dot(i, count_against(summary, subject, cell)));
+        let passes = subject.remade.iter().filter(|(variant, _)| *variant == Variant::TwoPasses);
+        let passes = passes.map(|(_, cell)| dot(in_passes, passes_against(summary, subject, cell)));
+        let label = summary.samplers[subject.sampler].label.clone();
+        DotRow { label, dots: counts.chain(passes).flatten().collect() }
+    };
+    let groups: Vec<DotGroup> = (0..summary.scenes.len())
+        .map(|scene| DotGroup {
+            title: summary.scenes[scene].name.clone(),
+            rows: summary.stability.iter().filter(|subject| subject.scene == scene).map(row).collect(),
+        })
+        .filter(|group| !group.rows.is_empty())
+        .collect();
+    let subtitle = format!("against one pass of {} spp; {}, 95 % intervals", asked.spp, replicates(summary));
+    let frame = frame(summary, "A sample more or less", &subtitle, ["RMSE / promised RMSE (no unit)", ""]);
+    Some(dot_chart(&frame, &kinds, 1.0, &groups))
 }
 
 /// What the speed chart of a scene is called in `figures/`: letters, digits and `.-_` alone, so that every viewer finds it.

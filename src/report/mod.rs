@@ -2,6 +2,7 @@
 //!
 //! [`write()`] is the whole of it: rows → [`summarise()`] → figures, tables, `report.md`.
 pub mod bias_variance;
+pub mod dots;
 pub mod evidence;
 pub mod figure;
 pub mod frame;

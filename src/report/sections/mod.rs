@@ -70,7 +70,7 @@ pub fn report(summary: &Summary, figures: &Figures) -> String {
     speed::section(summary, figures, &mut page);
     shortcut::section(summary, &mut page);
     failures::section(summary, &mut page);
-    stability::section(summary, &mut page);
+    stability::section(summary, figures, &mut page);
     failures::table(summary, &mut page);
     failures::limits(summary, &mut page);
     page.finish()

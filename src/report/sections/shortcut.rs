@@ -7,8 +7,8 @@ use super::super::evidence::{Answer, Limit, clearly_above_one, is_biased, paired
 use super::super::markdown::Page;
 use super::super::numbers::{estimate, listed, percent};
 use super::super::summarise::{Cell, Summary};
-use super::titles;
-use super::words::{estimate_cell, limit_words, name, ratio_cell, row, rows, scene_name};
+use super::words::{estimate_cell, level, limit_words, name, ratio_cell, row, rows, scene_name};
+use super::{tabulate, titles};
 
 /// The section, where the experiment asks for both estimators.
 pub fn section(summary: &Summary, page: &mut Page) {
@@ -92,7 +92,11 @@ fn of_scene(summary: &Summary, scene: usize, page: &mut Page) {
         "mean / unbiased mean",
         "row",
     ];
-    page.table(&head, &lines);
+    let caption = format!(
+        "bias², variance (both in squared radiance), RMSE in W/(m² sr) and the ratio of mean radiances (no unit) of both estimators in {at} at {most} spp; {}.",
+        level(summary)
+    );
+    tabulate(page, &format!("shortcut-{}", summary.scenes[scene].name), &caption, &head, &lines);
     page.bullets(&pairs.iter().map(|pair| sentence(summary, scene, pair)).collect::<Vec<_>>());
 }
 

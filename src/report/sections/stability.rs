@@ -10,11 +10,12 @@ use super::super::stability::{
     count_against, differences, passes_against, remade_ratio, scale_verdict, spread,
 };
 use super::super::summarise::{Cell, Subject, Summary};
-use super::titles;
-use super::words::{name, ratio_cell, rows, scene_name, times};
+use super::super::write::Figures;
+use super::words::{level, name, ratio_cell, rows, scene_name, times};
+use super::{show, tabulate, tabulate_folded, titles};
 
 /// The section, where the experiment asks for it.
-pub fn section(summary: &Summary, page: &mut Page) {
+pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
     let Some(asked) = &summary.about.experiment.stability else { return };
     page.heading(2, titles::STABILITY);
     if summary.stability.is_empty() {
@@ -33,6 +34,12 @@ pub fn section(summary: &Summary, page: &mut Page) {
         percent(LEAST - 1.0),
         percent(MARGIN - 1.0),
     ));
+    let caption = format!(
+        "RMSE over what is promised of it (no unit), {}; dashed: as promised. Against one pass of {} spp, numbers in [stability.csv](stability.csv).",
+        level(summary),
+        asked.spp
+    );
+    show(page, figures, "stability", true, &caption);
     counts(summary, &stretch, page);
     replicates(summary, page);
     scales(summary, page);
@@ -83,7 +90,13 @@ fn counts(summary: &Summary, stretch: &Stretch, page: &mut Page) {
                 std::iter::once(name(summary, subject.sampler)).chain(cells).chain([verdict]).collect()
             })
             .collect();
-        page.table(&head.iter().map(String::as_str).collect::<Vec<_>>(), &lines);
+        let at = scene_name(summary, scene);
+        let caption = format!(
+            "RMSE over that at {} spp in {at} (no unit), and what is promised of it; {}.",
+            asked.spp,
+            level(summary)
+        );
+        tabulate(page, &format!("counts-{}", summary.scenes[scene].name), &caption, &head, &lines);
         page.paragraph(&count_sentence(summary, stretch, scene, &subjects));
     }
 }
@@ -175,7 +188,11 @@ fn replicates(summary: &Summary, page: &mut Page) {
             [scene_name(summary, subject.scene), name(summary, subject.sampler)].into_iter().chain(numbers).collect()
         })
         .collect();
-    page.table(&["scene", "sampler", "median RMSE", "worst / median", "best / median", "spread"], &lines);
+    let spp = summary.about.experiment.stability.as_ref().map_or(0, |stability| stability.spp);
+    let caption =
+        format!("Median RMSE in W/(m² sr) of {n} replicates at {spp} spp, and the worst and best over it (no unit).");
+    let head = ["scene", "sampler", "median RMSE", "worst / median", "best / median", "spread"];
+    tabulate_folded(page, "spread", "Worst, best and median replicate", &caption, &head, &lines);
     let items: Vec<String> = by_scene(summary)
         .iter()
         .map(|(scene, subjects)| {
@@ -251,7 +268,12 @@ fn scales(summary: &Summary, page: &mut Page) {
         "RMS difference / RMSE",
         "verdict",
     ];
-    page.table(&head, &lines);
+    let spp = summary.about.experiment.stability.as_ref().map_or(0, |stability| stability.spp);
+    let caption = format!(
+        "RMSE of scaled scenes over that of the scene as it is at {spp} spp, replicate by replicate with the same seeds ({}), and how far the images differ; no units.",
+        level(summary)
+    );
+    tabulate_folded(page, "scales", "Scene by scene, sampler by sampler", &caption, &head, &lines);
     page.bullets(
         &by_scene(summary)
             .iter()
@@ -324,7 +346,13 @@ fn passes(summary: &Summary, stretch: &Stretch, page: &mut Page) {
         .collect();
     let head =
         ["scene", "sampler", "samples taken", "RMSE in two / in one", "promised", "bit for bit equal", "verdict"];
-    page.table(&head, &lines);
+    let caption = format!(
+        "RMSE of two passes of 1 and {} spp over that of one pass of {} (no unit), replicate by replicate; {}.",
+        asked.spp - 1,
+        asked.spp,
+        level(summary)
+    );
+    tabulate_folded(page, "passes", "Scene by scene, sampler by sampler", &caption, &head, &lines);
     let items: Vec<String> =
         by_scene(summary).iter().map(|(scene, subjects)| pass_sentence(summary, stretch, *scene, subjects)).collect();
     page.bullets(&items);
