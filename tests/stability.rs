@@ -413,19 +413,20 @@ fn other_numbers_have_other_words() {
     assert!(line(&level(1e-3, 1.0), "| `ld:best` |").ends_with("| stable |"));
     assert!(line(&level(0.5, 1.3), "| `ld:best` |").ends_with("| cannot tell |"));
 
-    let moved = |differing: f64, rms: f64| {
+    let moved = |jumping: f64, rms: f64| {
         let twin = move |row: &mut ImageRow| {
             if let (true, Some(twin)) =
                 (is_ld(&row.sampler, &row.scene) && row.variant == Variant::Scaled(6), &mut row.twin)
             {
-                (twin.differing, twin.rms) = (differing, rms);
+                (twin.differing, twin.jumping, twin.rms) = (jumping, jumping, rms);
             }
         };
         line(&edited(&out, |_| (), twin), "| `lights` | `ld:best` | 1e6 |")
     };
     assert!(moved(0.0, 0.0).ends_with("| bit for bit the same |"));
-    assert!(moved(1.0, 1e-9).ends_with("| unchanged beyond rounding |"));
-    assert!(moved(0.1, 1.0).ends_with("| changed |"));
+    assert!(moved(0.009, 1e-9).ends_with("| unchanged beyond rounding |"));
+    assert!(moved(0.011, 1e-9).ends_with("| changed |"), "too many pixels jump");
+    assert!(moved(0.009, 1.0).ends_with("| changed |"), "they jump too far");
 
     let passes = |factor: f64| {
         let worse = move |row: &mut ImageRow| {

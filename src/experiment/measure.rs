@@ -7,7 +7,7 @@ use crate::film::Image;
 use crate::stats::{Ensemble, Estimate, image_error, sum, t_interval};
 
 use super::identity::pixel_hash;
-use super::results::{ImageErrors, TwinDifference};
+use super::results::{ImageErrors, JUMP, TwinDifference};
 
 /// What images are compared with: two independent halves, or a closed form given twice.
 pub struct ReferenceImages {
@@ -76,9 +76,13 @@ pub fn difference(image: &Image, twin: &Image, twin_id: &str) -> TwinDifference 
     let bits = |pixel: &[f32; 3]| pixel.map(f32::to_bits);
     let differing = std::iter::zip(&image.pixels, &twin.pixels).filter(|(a, b)| bits(a) != bits(b)).count();
     let (a, b) = (image.pixels.as_flattened(), twin.pixels.as_flattened());
+    let jump = JUMP * mean_value(&twin.pixels).abs();
+    let jumps = |a: &[f32; 3], b: &[f32; 3]| (0..3).any(|c| (f64::from(a[c]) - f64::from(b[c])).abs() > jump);
+    let jumping = std::iter::zip(&image.pixels, &twin.pixels).filter(|(a, b)| jumps(a, b)).count();
     TwinDifference {
         id: twin_id.to_owned(),
         differing: differing as f64 / image.pixels.len() as f64,
+        jumping: jumping as f64 / image.pixels.len() as f64,
         largest: image_error::max_abs(a, b),
         rms: image_error::mse(a, b).sqrt(),
     }
@@ -162,6 +166,11 @@ mod tests {
         assert_eq!((difference(&a, &a, "a").differing, difference(&a, &a, "a").rms), (0.0, 0.0));
         let d = difference(&b, &a, "a");
         assert_eq!((d.id.as_str(), d.differing, d.largest, d.rms), ("a", 0.5, 1.5, (1.5f64 * 1.5 / 6.0).sqrt()));
+        assert_eq!(d.jumping, 0.5);
+        // The mean is 1, so a jump is more than 1e−4.
+        let near = |off: f32| Image { width: 2, height: 1, pixels: vec![[1.0 + off, 2.0, 3.0], [0.0; 3]] };
+        let jumping = |off: f32| difference(&near(off), &a, "a").jumping;
+        assert_eq!((jumping(0.9e-4), jumping(1.1e-4)), (0.0, 0.5));
         let zeros = |zero: f32| Image { width: 1, height: 1, pixels: vec![[zero; 3]] };
         assert_eq!(difference(&zeros(0.0), &zeros(-0.0), "a").differing, 1.0, "bits, not values");
     }

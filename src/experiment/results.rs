@@ -102,6 +102,9 @@ pub struct ImageErrors {
     pub error_autocorrelation: Option<f64>,
 }
 
+/// A difference of more than this share of the mean is called a jump; f32 images that differ by roundings differ by 1e−6.
+pub const JUMP: f64 = 1e-4;
+
 /// What differs between an image and its twin, another making of the same picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TwinDifference {
@@ -109,6 +112,9 @@ pub struct TwinDifference {
     pub id: String,
     /// Share of the pixels that differ in any bit, 0 to 1; 0 where the images are the same bit for bit.
     pub differing: f64,
+    /// Share of the pixels in which a channel differs by more than [`JUMP`] of the twin's mean: more than roundings add up
+    /// to, as where one moves a ray across an edge.
+    pub jumping: f64,
     /// Largest absolute difference of a pixel-channel, radiance.
     pub largest: f64,
     /// Root mean square difference over pixel-channels, radiance.
@@ -542,7 +548,8 @@ mod tests {
         assert!(!row.to_line().contains("variant") && !row.to_line().contains("twin"));
         let Row::Image(image) = &mut row else { unreachable!() };
         image.variant = Variant::Scaled(-6);
-        image.twin = Some(TwinDifference { id: "a".to_owned(), differing: 0.5, largest: 1e-7, rms: 0.1 + 0.2 });
+        image.twin =
+            Some(TwinDifference { id: "a".to_owned(), differing: 0.5, jumping: 0.25, largest: 1e-7, rms: 0.1 + 0.2 });
         let line = row.to_line();
         assert!(line.contains(r#""variant":"scaled(1e-6)","#) && line.contains(r#""twin":{"id":"a","differing":0.5,"#));
         assert_eq!(Row::parse(&line), Ok(row));

@@ -24,9 +24,12 @@ pub const MARGIN: f64 = 1.1;
 /// A spread is narrow where the worst replicate's RMSE is at most this much larger than the median, wide where it is more.
 pub const WIDE: f64 = 1.25;
 
-/// Images that differ by a root mean square of at most this share of their RMSE differ by roundings alone: their RMSE cannot
-/// differ by more than this share (triangle inequality).
-pub const ROUNDING: f64 = 0.01;
+/// Images differ by roundings alone if in at most this share of their pixels a ray was moved across an edge…
+pub const JUMPING: f64 = 0.01;
+
+/// … and if they differ by a root mean square of at most this share of their RMSE, so that the RMSE cannot differ by more either
+/// (triangle inequality).
+pub const ROUNDING: f64 = 0.1;
 
 /// What a ratio of errors says, over what is promised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -149,7 +152,7 @@ pub fn remade_ratio(base: &Cell, cell: &Cell) -> Option<Estimate> {
 pub enum ScaleVerdict {
     /// Nothing, in any bit of any replicate.
     Same,
-    /// Roundings: see [`ROUNDING`].
+    /// Roundings: see [`JUMPING`] and [`ROUNDING`].
     Unchanged,
     /// More than that, in one replicate at least.
     Changed,
@@ -174,6 +177,8 @@ impl ScaleVerdict {
 pub struct Differences {
     /// Share of the pixels that differ in any bit.
     pub differing: f64,
+    /// Share of the pixels that jump, see [`JUMP`](crate::experiment::results::JUMP).
+    pub jumping: f64,
     /// Largest difference of a pixel-channel over the mean radiance.
     pub largest: f64,
     /// Root mean square difference over the base's RMSE; `None` where that is not above 0.
@@ -188,6 +193,7 @@ pub fn differences(base: &Cell, twins: &[TwinDifference]) -> Option<Differences>
     let mean = base.replicate_mean.iter().copied().collect::<Moments>().mean()?;
     (!twins.is_empty()).then(|| Differences {
         differing: worst(&|twin| twin.differing),
+        jumping: worst(&|twin| twin.jumping),
         largest: worst(&|twin| twin.largest) / mean,
         rms: base.rmse.filter(|rmse| rmse.value > 0.0).map(|rmse| worst(&|twin| twin.rms) / rmse.value),
         same: twins.iter().filter(|twin| twin.differing == 0.0).count(),
@@ -201,7 +207,7 @@ pub fn scale_verdict(base: &Cell, cell: &Cell) -> ScaleVerdict {
     };
     match d.rms {
         _ if d.differing == 0.0 => ScaleVerdict::Same,
-        Some(rms) if rms <= ROUNDING => ScaleVerdict::Unchanged,
+        Some(rms) if rms <= ROUNDING && d.jumping <= JUMPING => ScaleVerdict::Unchanged,
         Some(_) => ScaleVerdict::Changed,
         None => ScaleVerdict::CannotTell,
     }
@@ -272,7 +278,7 @@ fn median_is_below(n: usize) -> Option<usize> {
 pub fn csv(summary: &Summary) -> String {
     let mut text = format!("# {}\n", provenance::line(&summary.about));
     text += "scene,sampler,stands_for,variant,row,base_row,spp_asked,spp_taken,rmse_ratio,rmse_ratio_low,rmse_ratio_high,promised,promised_low,promised_high,\
-             pixels_that_differ,largest_difference_over_mean,rms_difference_over_rmse,verdict\n";
+             pixels_that_differ,pixels_that_jump,largest_difference_over_mean,rms_difference_over_rmse,verdict\n";
     let stretch = Stretch::of(summary);
     for subject in &summary.stability {
         for cell in &subject.counts {
@@ -319,7 +325,7 @@ fn csv_line(
     line += &estimate_fields(ratio.map(six_digits));
     line += &estimate_fields(promised.map(six_digits));
     let d = differences(&subject.base, &cell.twins);
-    for number in [d.map(|d| d.differing), d.map(|d| d.largest), d.and_then(|d| d.rms)] {
+    for number in [d.map(|d| d.differing), d.map(|d| d.jumping), d.map(|d| d.largest), d.and_then(|d| d.rms)] {
         line += &format!(",{}", number.map(|number| number.to_string()).unwrap_or_default());
     }
     format!("{line},{verdict}\n")

@@ -1,13 +1,13 @@
 //! How each sampler bears what should make no difference: a sample more or less, another randomisation, another unit of
 //! length, two passes.
 
-use crate::experiment::results::Variant;
+use crate::experiment::results::{JUMP, Variant};
 
 use super::super::markdown::Page;
-use super::super::numbers::{counted, listed, percent, short};
+use super::super::numbers::{counted, listed, percent, short, with_interval};
 use super::super::stability::{
-    Against, Differences, FALSE_ALARM, LEAST, MARGIN, ROUNDING, ScaleVerdict, SpreadVerdict, Stretch, Verdict, WIDE,
-    count_against, differences, passes_against, remade_ratio, scale_verdict, spread,
+    Against, Differences, FALSE_ALARM, JUMPING, LEAST, MARGIN, ROUNDING, ScaleVerdict, SpreadVerdict, Stretch, Verdict,
+    WIDE, count_against, differences, passes_against, remade_ratio, scale_verdict, spread,
 };
 use super::super::summarise::{Cell, Subject, Summary};
 use super::super::write::Figures;
@@ -237,8 +237,9 @@ fn scales(summary: &Summary, page: &mut Page) {
     page.heading(3, "In another unit of length");
     page.paragraph(&format!(
         "The scene with all lengths (mesh, camera, lens, focus) multiplied, the same seeds: radiance does not depend on the unit of length, so nothing but roundings may change. A rounding may \
-         move a ray across an edge, so single samples may differ; *unchanged beyond rounding* if no replicate's image moves by a root mean square of more than {} of its RMSE, so that the RMSE cannot \
-         change by more either. Pixels that differ (in any bit), the largest difference over the mean radiance and the root mean square difference over the RMSE are the worst of all replicates.",
+         move a ray across an edge, and then a pixel jumps (by more than {JUMP:e} of the mean radiance). *Unchanged beyond rounding*: in no replicate do more than {} of the pixels jump, and none differs by a root mean \
+         square of more than {} of the RMSE, so that the RMSE cannot change by more either; *changed*: more than that in one replicate at least. Of all replicates the worst is shown.",
+        percent(JUMPING),
         percent(ROUNDING)
     ));
     let mut lines = Vec::new();
@@ -250,8 +251,9 @@ fn scales(summary: &Summary, page: &mut Page) {
                 scene_name(summary, subject.scene),
                 name(summary, subject.sampler),
                 format!("1e{power}").replace('-', "−"),
-                ratio_cell(remade_ratio(&subject.base, cell)),
+                of(remade_ratio(&subject.base, cell).map(|ratio| with_interval(&ratio, |x| format!("{x:.4}")))),
                 of(d.map(|d| percent(d.differing))),
+                of(d.map(|d| percent(d.jumping))),
                 of(d.map(|d| short(d.largest))),
                 of(d.and_then(|d| d.rms).map(short)),
                 scale_verdict(&subject.base, cell).word().to_owned(),
@@ -263,14 +265,15 @@ fn scales(summary: &Summary, page: &mut Page) {
         "sampler",
         "lengths times",
         "RMSE / as it is",
-        "pixels that differ",
+        "pixels that differ in a bit",
+        "pixels that jump",
         "largest difference / mean",
         "RMS difference / RMSE",
         "verdict",
     ];
     let spp = summary.about.experiment.stability.as_ref().map_or(0, |stability| stability.spp);
     let caption = format!(
-        "RMSE of scaled scenes over that of the scene as it is at {spp} spp, replicate by replicate with the same seeds ({}), and how far the images differ; no units.",
+        "RMSE of scaled scenes over that of the scene as it is at {spp} spp, replicate by replicate with the same seeds, and how far the images differ (no units); {}.",
         level(summary)
     );
     tabulate_folded(page, "scales", "Scene by scene, sampler by sampler", &caption, &head, &lines);
@@ -283,6 +286,13 @@ fn scales(summary: &Summary, page: &mut Page) {
 }
 
 fn scale_sentence(summary: &Summary, scene: usize, subjects: &[&Subject]) -> String {
+    let all: Vec<ScaleVerdict> =
+        subjects.iter().flat_map(|s| scaled(s).map(|(_, cell)| scale_verdict(&s.base, cell))).collect();
+    if let [first, rest @ ..] = all.as_slice()
+        && rest.iter().all(|verdict| verdict == first)
+    {
+        return format!("In {}, {} under every sampler at every scale.", scene_name(summary, scene), first.word());
+    }
     let verdicts = [ScaleVerdict::Changed, ScaleVerdict::Unchanged, ScaleVerdict::Same, ScaleVerdict::CannotTell];
     let groups: Vec<(String, Vec<String>)> = verdicts
         .into_iter()
