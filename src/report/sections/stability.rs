@@ -237,8 +237,9 @@ fn scales(summary: &Summary, page: &mut Page) {
     page.heading(3, "In another unit of length");
     page.paragraph(&format!(
         "The scene with all lengths (mesh, camera, lens, focus) multiplied, the same seeds: radiance does not depend on the unit of length, so nothing but roundings may change. A rounding may \
-         move a ray across an edge, and then a pixel jumps (by more than {JUMP:e} of the mean radiance). *Unchanged beyond rounding*: in no replicate do more than {} of the pixels jump, and none differs by a root mean \
+         move a ray across an edge, and then a pixel jumps (by more than {} of the mean radiance). *Unchanged beyond rounding*: in no replicate do more than {} of the pixels jump, and none differs by a root mean \
          square of more than {} of the RMSE, so that the RMSE cannot change by more either; *changed*: more than that in one replicate at least. Of all replicates the worst is shown.",
+        short(JUMP),
         percent(JUMPING),
         percent(ROUNDING)
     ));
