@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
 use crate::film::Image;
+use crate::sampling::Decision;
 pub use crate::scene::compile::Stage;
 pub use crate::scene::config::Estimator;
 
@@ -130,6 +131,13 @@ pub struct SceneFacts {
     pub memory_bytes: u64,
 }
 
+impl SceneFacts {
+    /// The decisions that the scene makes, in order.
+    pub fn decisions(&self) -> Vec<Decision> {
+        Decision::named_in(&self.layout)
+    }
+}
+
 /// Numbers that stand for the code behind an item: each is raised when, and only when, that code's bits change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Algorithms {
@@ -150,7 +158,7 @@ pub struct Algorithms {
 pub struct RenderRequest<'a> {
     /// Scene, by the name of its [`SceneFacts`].
     pub scene: &'a str,
-    /// Sampler in canonical form, for every decision.
+    /// Sampler, or set of samplers, in canonical form.
     pub sampler: &'a str,
     /// Samples per pixel asked for; the sampler takes [`Backend::taken`].
     pub spp: u32,
@@ -186,6 +194,18 @@ pub trait Backend {
     /// # Errors
     /// Kind `Input` with the legal combinations.
     fn parse_sampler(&self, text: &str) -> Result<String>;
+
+    /// Whether the sampler is a set of different ones for different decisions, so that it has no one point set.
+    fn is_mixed(&self, canonical: &str) -> bool {
+        let _ = canonical;
+        false
+    }
+
+    /// What the sampler means for the decisions that the scene makes: equal exactly where the numbers are equal there.
+    fn meaning(&self, canonical: &str, scene: &str) -> String {
+        let _ = scene;
+        canonical.to_owned()
+    }
 
     /// Whether another seed gives another image of the scene, or another point set where no scene is given. Without
     /// that there is nothing to replicate. It is a question about both: a sampler may draw for some decisions only.

@@ -9,8 +9,8 @@ use std::collections::{HashMap, HashSet};
 
 use super::backend::{Algorithms, Backend, Estimator, SceneFacts, Size, Stage};
 use super::identity::{Fingerprint, SeedOf};
-use super::results::{Count, Kind};
-use super::spec::{Experiment, Pictures};
+use super::results::{Count, Kind, LeftOut};
+use super::spec::{Experiment, Pictures, SamplerEntry};
 use crate::error::{Error, Result, did_you_mean};
 
 /// One image to render.
@@ -231,6 +231,8 @@ pub struct Plan {
     pub items: Vec<WorkItem>,
     /// What the plan made of the experiment, in sentences for a reader.
     pub notes: Vec<String>,
+    /// Sets of samplers that are not done in a scene, because another one means the same there.
+    pub left_out: Vec<LeftOut>,
     positions: HashMap<String, usize>,
 }
 
@@ -305,6 +307,7 @@ pub fn plan(experiment: &Experiment, backend: &dyn Backend) -> Result<Plan> {
     let scenes = open_scenes(experiment, backend)?;
     let samplers = read_samplers(experiment, backend)?;
     let reference_sampler = read_reference_sampler(experiment, backend, &samplers, &scenes)?;
+    let left_out = same_in_a_scene(&scenes, &samplers, backend);
     for (scene, sampler) in scenes.iter().flat_map(|scene| samplers.iter().map(move |sampler| (scene, sampler))) {
         let place = |e: Error| Error::input(format!("{}: samplers: scene {}", experiment.place, scene.name), e);
         backend.check_sampler(&sampler.canonical, &scene.name).map_err(place)?;
@@ -314,6 +317,7 @@ pub fn plan(experiment: &Experiment, backend: &dyn Backend) -> Result<Plan> {
         experiment,
         backend,
         reference: &reference_sampler,
+        left_out: &left_out,
         is_shown: false,
         items: Vec::new(),
         notes: Vec::new(),
@@ -332,7 +336,7 @@ pub fn plan(experiment: &Experiment, backend: &dyn Backend) -> Result<Plan> {
     refuse_equal_seeds(&items, &experiment.place)?;
     let positions: HashMap<String, usize> = items.iter().enumerate().map(|(i, item)| (item.id.clone(), i)).collect();
     assert_eq!(positions.len(), items.len(), "two items of one id");
-    Ok(Plan { experiment: experiment.clone(), scenes, samplers, reference_sampler, items, notes, positions })
+    Ok(Plan { experiment: experiment.clone(), scenes, samplers, reference_sampler, items, notes, left_out, positions })
 }
 
 /// Items that draw numbers have seeds of their own: an image must share no randomness with what it is compared with.
@@ -373,14 +377,54 @@ fn open_scenes(experiment: &Experiment, backend: &dyn Backend) -> Result<Vec<Sce
 /// Reads the compared samplers and puts texts that mean the same one together.
 fn read_samplers(experiment: &Experiment, backend: &dyn Backend) -> Result<Vec<PlannedSampler>> {
     let mut samplers: Vec<PlannedSampler> = Vec::new();
-    for (i, text) in experiment.samplers.iter().enumerate() {
-        let canonical = read_sampler(text, &format!("samplers[{i}]"), experiment, backend)?;
+    for (i, entry) in experiment.samplers.iter().enumerate() {
+        let canonical = read_entry(entry, &format!("samplers[{i}]"), experiment, backend)?;
         match samplers.iter_mut().find(|known| known.canonical == canonical) {
-            Some(known) => known.names.push(text.clone()),
-            None => samplers.push(PlannedSampler { canonical, names: vec![text.clone()] }),
+            Some(known) => known.names.push(entry.name().to_owned()),
+            None => samplers.push(PlannedSampler { canonical, names: vec![entry.name().to_owned()] }),
         }
     }
     Ok(samplers)
+}
+
+/// Reads one entry of the list of samplers, decision by decision where it is a set.
+fn read_entry(entry: &SamplerEntry, key: &str, experiment: &Experiment, backend: &dyn Backend) -> Result<String> {
+    for (part, text) in entry.parts() {
+        let key = part.map_or(key.to_owned(), |part| format!("{key}.{part}"));
+        read_sampler(text, &key, experiment, backend)?;
+    }
+    let canonical = read_sampler(&entry.text(), key, experiment, backend)?;
+    // A name that is another sampler's text would make every sentence about it a lie.
+    if let (SamplerEntry::Set { name, .. }, Ok(named)) = (entry, backend.parse_sampler(entry.name()))
+        && named != canonical
+    {
+        let what = format!("expected a name that is not another sampler's, found {name:?}, which is {named}");
+        return Err(Error::input(format!("{}: {key}.name", experiment.place), what));
+    }
+    Ok(canonical)
+}
+
+/// The sets that mean in a scene the same as a single sampler, or as an earlier set: for want of a lens, say.
+fn same_in_a_scene(scenes: &[SceneFacts], samplers: &[PlannedSampler], backend: &dyn Backend) -> Vec<LeftOut> {
+    let (sets, single): (Vec<&PlannedSampler>, Vec<_>) =
+        samplers.iter().partition(|sampler| backend.is_mixed(&sampler.canonical));
+    let mut left_out = Vec::new();
+    for scene in scenes {
+        let mut done: HashMap<String, &str> = HashMap::new();
+        for PlannedSampler { canonical, .. } in single.iter().chain(&sets) {
+            let meaning = backend.meaning(canonical, &scene.name);
+            match done.get(&meaning) {
+                Some(same_as) if backend.is_mixed(canonical) => left_out.push(LeftOut {
+                    scene: scene.name.clone(),
+                    sampler: canonical.clone(),
+                    same_as: (*same_as).to_owned(),
+                }),
+                Some(_) => {}
+                None => drop(done.insert(meaning, canonical)),
+            }
+        }
+    }
+    left_out
 }
 
 /// Reads one sampler; the message says where in the experiment it stands.
@@ -403,6 +447,19 @@ fn read_reference_sampler(
         let names = compared.names.join(" and ");
         return refuse(format!(
             "expected a sampler that is not compared, found {text:?}, which is {names}: {canonical}"
+        ));
+    }
+    // A set may be, for the decisions that one scene makes, what the reference is.
+    let is_compared = |scene: &SceneFacts| {
+        let meaning = |canonical: &str| backend.meaning(canonical, &scene.name);
+        let is_set = |other: &str| backend.is_mixed(other) || backend.is_mixed(&canonical);
+        samplers.iter().find(|s| is_set(&s.canonical) && meaning(&s.canonical) == meaning(&canonical))
+    };
+    if let Some((scene, compared)) = scenes.iter().find_map(|scene| Some((scene, is_compared(scene)?))) {
+        return refuse(format!(
+            "expected a sampler that is not compared, found {text:?}, which is the same as {} in {}",
+            compared.names.join(" and "),
+            scene.name
         ));
     }
     let is_fixed = |scene: &&SceneFacts| !scene.exact_reference && !backend.is_random(&canonical, Some(&scene.name));
@@ -435,6 +492,7 @@ struct Planner<'a> {
     experiment: &'a Experiment,
     backend: &'a dyn Backend,
     reference: &'a PlannedSampler,
+    left_out: &'a [LeftOut],
     /// Whether the items added now are looked at.
     is_shown: bool,
     items: Vec<WorkItem>,
@@ -452,6 +510,31 @@ impl Planner<'_> {
                 self.notes.push(what);
             }
         }
+        let is_set = |sampler: &&PlannedSampler| self.backend.is_mixed(&sampler.canonical);
+        let sets: Vec<&str> = samplers.iter().filter(is_set).map(|sampler| sampler.names[0].as_str()).collect();
+        if self.experiment.points.is_some() && !sets.is_empty() {
+            self.notes.push(format!("no point sets of {}: each has a sampler a decision", sets.join(", ")));
+        }
+    }
+
+    /// The samplers that are done in a scene.
+    fn done_in<'s>(&self, scene: &SceneFacts, samplers: &'s [PlannedSampler]) -> Vec<&'s PlannedSampler> {
+        let is_out = |canonical: &str| self.left_out.iter().any(|l| l.scene == scene.name && l.sampler == canonical);
+        samplers.iter().filter(|sampler| !is_out(&sampler.canonical)).collect()
+    }
+
+    /// Says which sets are not done in a scene.
+    fn note_left_out(&mut self, scene: &SceneFacts, samplers: &[PlannedSampler]) {
+        let names = |canonical: &str| {
+            let found = samplers.iter().find(|sampler| sampler.canonical == canonical);
+            found.map_or_else(|| canonical.to_owned(), |sampler| sampler.names.join(" = "))
+        };
+        let of_scene = self.left_out.iter().filter(|left_out| left_out.scene == scene.name);
+        let notes = of_scene.map(|l| {
+            let (sampler, same_as) = (names(&l.sampler), names(&l.same_as));
+            format!("{}, {sampler}: the same as {same_as} for the decisions of this scene, so not done", scene.name)
+        });
+        self.notes.extend(notes);
     }
 
     /// Says what becomes of replicates and spp in one scene.
@@ -459,7 +542,8 @@ impl Planner<'_> {
         if scene.exact_reference {
             self.notes.push(format!("{}: the reference is a closed form", scene.name));
         }
-        for sampler in samplers {
+        self.note_left_out(scene, samplers);
+        for sampler in self.done_in(scene, samplers) {
             let what = format!("{}, {}", scene.name, sampler.names.join(", "));
             if self.experiment.replicates > 1 && !self.backend.is_random(&sampler.canonical, Some(&scene.name)) {
                 self.notes.push(format!("{what}: nothing random, so 1 replicate and no variance"));
@@ -495,7 +579,7 @@ impl Planner<'_> {
     /// Point-set metrics of every sampler.
     fn add_points(&mut self, samplers: &[PlannedSampler]) {
         let Some(points) = &self.experiment.points else { return };
-        for sampler in samplers {
+        for sampler in samplers.iter().filter(|sampler| !self.backend.is_mixed(&sampler.canonical)) {
             for &asked in &points.n {
                 for replicate in 0..self.replicates(&sampler.canonical, None, points.replicates) {
                     self.add_point_set(&sampler.canonical, asked, replicate, &points.metrics);
@@ -527,7 +611,7 @@ impl Planner<'_> {
     fn add_statistics(&mut self, scene: &SceneFacts, size: Size, samplers: &[PlannedSampler]) {
         self.note_scene(scene, samplers);
         let reference_id = self.add_reference(scene, size, self.experiment.reference.spp, "reference");
-        for sampler in samplers {
+        for sampler in self.done_in(scene, samplers) {
             for &asked in &self.experiment.spp {
                 self.add_replicates(scene, size, sampler, asked, &reference_id);
             }
@@ -622,7 +706,7 @@ impl Planner<'_> {
     fn add_pictures(&mut self, scene: &SceneFacts, pictures: &Pictures, samplers: &[PlannedSampler]) {
         self.is_shown = true;
         let reference_id = self.add_reference(scene, pictures.size, pictures.reference_spp, "picture reference");
-        for sampler in samplers {
+        for sampler in self.done_in(scene, samplers) {
             let work = ImageWork {
                 kind: Kind::Picture,
                 scene: scene.name.clone(),

@@ -96,7 +96,12 @@ impl SamplerSet {
 
     /// Whether anything that `layout` uses is random.
     pub fn is_random(&self, layout: &SampleLayout) -> bool {
-        layout.claims().iter().any(|claim| read_by(self.of(claim.decision), claim.decision).is_random())
+        self.is_random_for(&layout.claims().iter().map(|claim| claim.decision).collect::<Vec<_>>())
+    }
+
+    /// Whether anything that `decisions` read is random.
+    pub fn is_random_for(&self, decisions: &[Decision]) -> bool {
+        decisions.iter().any(|&decision| read_by(self.of(decision), decision).is_random())
     }
 
     /// What it means where only `decisions` are made: equal exactly where two sets hand out the same numbers there.
