@@ -530,11 +530,15 @@ impl Planner<'_> {
             found.map_or_else(|| canonical.to_owned(), |sampler| sampler.names.join(" = "))
         };
         let of_scene = self.left_out.iter().filter(|left_out| left_out.scene == scene.name);
-        let notes = of_scene.map(|l| {
-            let (sampler, same_as) = (names(&l.sampler), names(&l.same_as));
-            format!("{}, {sampler}: the same as {same_as} for the decisions of this scene, so not done", scene.name)
-        });
-        self.notes.extend(notes);
+        let pairs: Vec<String> = of_scene.map(|l| format!("{} = {}", names(&l.sampler), names(&l.same_as))).collect();
+        if !pairs.is_empty() {
+            self.notes.push(format!(
+                "{}: not done, since they are the same for the decisions of this scene ({}): {}",
+                scene.name,
+                scene.layout,
+                pairs.join(", ")
+            ));
+        }
     }
 
     /// Says what becomes of replicates and spp in one scene.

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use crate::sampling::{Points, Preset, SamplerSpec, point_set};
 use crate::stats::Estimate;
 
-use super::ablation::{Ablation, Question, ablations};
+use super::ablation::{Ablation, ablations};
 use super::bias_variance::{self, BiasVariance, Group, bias_variance_chart};
 use super::figure::{Figure, Rgb8};
 use super::frame::Frame;
@@ -185,13 +185,7 @@ pub fn which_decision(summary: &Summary) -> Option<Figure> {
     let panel = |group: &Ablation| {
         let parts = group.parts.iter().map(|part| Share { decision: Some(part.decision), share: part.gone });
         let all = group.all.iter().map(|(_, gone)| Share { decision: None, share: *gone });
-        let base = &summary.samplers[group.base].label;
-        let asks = match group.question {
-            Question::Share => "well spread alone",
-            Question::Coupling => "apart alone",
-            Question::Exchange => "exchanged alone",
-        };
-        let title = format!("{}: {base}, {asks}", summary.scenes[group.scene].name);
+        let title = format!("{}: {}", summary.scenes[group.scene].name, summary.samplers[group.base].label);
         SharePanel { title, bars: parts.chain(all).collect() }
     };
     let of_column = |groups: &[Ablation], column: &(usize, SamplerSpec)| {
@@ -202,8 +196,15 @@ pub fn which_decision(summary: &Summary) -> Option<Figure> {
         rows.flat_map(|groups| columns.iter().map(|c| of_column(groups, c)).collect::<Vec<_>>()).collect();
     let spp: BTreeSet<u32> = groups.iter().flatten().map(|group| group.spp).collect();
     let spp: Vec<String> = spp.iter().map(u32::to_string).collect();
-    let subtitle = format!("{} spp, {}, 95 % intervals", listed(&spp), replicates(summary));
-    let axes = ["share of the MSE that goes where this decision alone reads the other sampler", ""];
+    let exchange = |(base, other): &(usize, SamplerSpec)| format!("{} → {other}", summary.samplers[*base].label);
+    let exchanges: Vec<String> = columns.iter().map(exchange).collect();
+    let subtitle = format!(
+        "one decision at a time {}; {} spp, {}, 95 % intervals",
+        listed(&exchanges),
+        listed(&spp),
+        replicates(summary)
+    );
+    let axes = ["share of the MSE that goes where this decision alone is exchanged", ""];
     Some(share_chart(&frame(summary, "Which decision matters", &subtitle, axes), &panels, columns.len()))
 }
 

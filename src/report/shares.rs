@@ -5,6 +5,7 @@ use crate::stats::Estimate;
 
 use super::figure::{Align, Bounds, Colour, Dash, Drawing, Figure, PAGE_WIDTH, shortened, text_width};
 use super::frame::{Frame, HEADING, Header, SMALL, TICK, draw_axis_names, draw_no_data};
+use super::labels::kept_apart;
 use super::numbers::percent;
 use super::style::{GREY, GRID, INK, PALE, decision_colour, lightened};
 
@@ -30,7 +31,7 @@ const BAR: f64 = 20.0;
 const TITLE_STEP: f64 = 24.0;
 const GAP: f64 = 22.0;
 /// Room right of a panel for its bars' numbers.
-const NUMBER: f64 = 48.0;
+const NUMBER: f64 = 54.0;
 /// What a bar may say to the left: an error that doubled.
 const LOWEST: f64 = -1.0;
 const ALL_COLOUR: Colour = [136, 136, 136];
@@ -64,7 +65,7 @@ impl Axis {
 }
 
 fn name(bar: &Share) -> &'static str {
-    bar.decision.map_or("all of them", Decision::name)
+    bar.decision.map_or("all at once", Decision::name)
 }
 
 fn drawn(frame: &Frame, panels: &[Option<SharePanel>], columns: usize) -> Drawing {
@@ -106,11 +107,15 @@ fn draw_panel(drawing: &mut Drawing, axis: &Axis, panel: &SharePanel, top: f64, 
     drawing.heading((axis.left, top + 14.0), &shortened(&panel.title, HEADING, true, room));
     let first = top + TITLE_STEP;
     let bottom = first + BAR * panel.bars.len() as f64;
-    for tick in axis.ticks() {
-        let x = axis.pixel(tick);
+    let ticks = axis.ticks();
+    let spans: Vec<(f64, f64)> =
+        ticks.iter().map(|&tick| (axis.pixel(tick), text_width(&percent(tick), TICK, false))).collect();
+    for ((&tick, &(x, _)), is_named) in ticks.iter().zip(&spans).zip(kept_apart(&spans, 5.0)) {
         let colour = if tick == 0.0 { PALE } else { GRID };
         drawing.line(&[(x, first), (x, bottom)], 1.0, colour, Dash::Solid);
-        drawing.text((x, bottom + 12.0), &percent(tick), TICK, GREY, Align::Centre);
+        if is_named {
+            drawing.text((x, bottom + 12.0), &percent(tick), TICK, GREY, Align::Centre);
+        }
     }
     for (i, bar) in panel.bars.iter().enumerate() {
         let y = first + BAR * (i as f64 + 0.5);
@@ -140,7 +145,7 @@ fn draw_bar(drawing: &mut Drawing, axis: &Axis, bar: &Share, y: f64) {
     let text = if bar.share.value.is_finite() { percent(bar.share.value) } else { "–".to_owned() };
     drawing.text(
         (axis.right + NUMBER - 8.0, y + 4.0),
-        &shortened(&text, TICK, false, NUMBER - 14.0),
+        &shortened(&text, TICK, false, NUMBER - 10.0),
         TICK,
         colour,
         Align::Right,

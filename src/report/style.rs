@@ -3,7 +3,7 @@
 //! Colours are Okabe and Ito's, told apart by the colour-blind (<https://jfly.uni-koeln.de/color/>); a shape beside
 //! each makes a figure readable in grey.
 
-use crate::sampling::{Decision, Order, Points, SamplerSet, SamplerSpec};
+use crate::sampling::{Decision, Order, Points, SamplerSet};
 
 use super::figure::{Colour, Dash, Drawing, Place, regular};
 
@@ -91,13 +91,7 @@ pub fn decision_colour(decision: Decision) -> Colour {
 /// The look of a set of different samplers: the shape is that of the sampler which most decisions read, hollow where that
 /// one walks in step; the colour is that of the one decision which reads another, purple where several do.
 pub fn style_of_set(set: &SamplerSet) -> Style {
-    let reads = |spec: &SamplerSpec| Decision::ALL.iter().filter(|&&d| set.of(d) == *spec).count();
-    let specs = Decision::ALL.map(|d| set.of(d));
-    let mut most = specs[0];
-    for spec in specs {
-        most = if reads(&spec) > reads(&most) { spec } else { most };
-    }
-    let odd: Vec<Decision> = Decision::ALL.into_iter().filter(|&d| set.of(d) != most).collect();
+    let (most, odd) = set.majority();
     let Style { marker, .. } = style_of(most.points.word());
     let colour = if let [one] = odd[..] { decision_colour(one) } else { [204, 121, 167] };
     Style { colour, marker, filled: most.points == Points::Uniform || most.order != Order::Step, dash: Dash::DashDot }

@@ -110,6 +110,16 @@ impl SamplerSet {
         decisions.iter().map(part).collect::<Vec<_>>().join(" ")
     }
 
+    /// The sampler that most decisions read (of equally many the first), and the decisions that read another.
+    pub fn majority(&self) -> (SamplerSpec, Vec<Decision>) {
+        let readers = |spec: &SamplerSpec| Decision::ALL.iter().filter(|&&d| self.of(d) == *spec).count();
+        let mut most = self.of(Decision::Pixel);
+        for spec in self.by_decision {
+            most = if readers(&spec) > readers(&most) { spec } else { most };
+        }
+        (most, Decision::ALL.into_iter().filter(|&d| self.of(d) != most).collect())
+    }
+
     /// The decisions among `decisions` for which two sets hand out different numbers.
     pub fn differing(&self, other: &Self, decisions: &[Decision]) -> Vec<Decision> {
         decisions.iter().copied().filter(|&d| read_by(self.of(d), d) != read_by(other.of(d), d)).collect()
@@ -229,6 +239,8 @@ mod tests {
         assert_eq!(base.meaning(&[Decision::Pixel]), expanded.meaning(&[Decision::Pixel]));
         assert_eq!(lens_apart.single_of(&pinhole), base.single());
         assert_eq!((lens_apart.single(), lens_apart.single_of(&[])), (None, None));
+        assert_eq!(lens_apart.majority(), (base.of(Decision::Pixel), vec![Decision::Lens]));
+        assert_eq!(base.majority(), (base.of(Decision::Pixel), vec![]));
     }
 
     /// A scene with all decisions, and the span of each that a sampler hands out.

@@ -4,6 +4,7 @@ use crate::sampling::Decision;
 use crate::stats::Estimate;
 
 use super::super::ablation::{Ablation, Part, Question, Source, ablations};
+use super::super::evidence::{Answer, below};
 use super::super::markdown::Page;
 use super::super::numbers::{listed, percent, with_interval};
 use super::super::summarise::{Cell, Summary};
@@ -44,12 +45,13 @@ fn explain(found: &[(usize, Vec<Ablation>)], page: &mut Page) {
     page.paragraph(
         "One decision at a time reads another sampler, all others stay as they were; given is the share of the mean square error that goes, \
          1 − MSE/MSE before, at the largest common count. Replicates are independent of each other. A decision is named where it takes more away than every other one at a joint level of 95 % \
-         (intervals widened for the number of decisions, Bonferroni); decisions that this does not part from the largest share are named together.",
+         (intervals widened for the number of decisions, Bonferroni); decisions that this does not part from the largest share are named together. \"Almost as much\" is at least four fifths of the largest share, by the whole of both intervals.",
     );
     if asks(Question::Share) {
         page.paragraph(
             "*From independent points*: every decision draws uniform numbers, then one alone gets well-spread points. What goes is the decision's main effect, the first-order part of \
-             an analysis of variance of the pixel (as far as so many points find it); what remains when all these shares are taken off hangs on decisions together: interactions.",
+             an analysis of variance of the pixel, as far as so many points find it: a lower bound. What is left when all these shares are taken off hangs on decisions together \
+             (interactions), or is what the points missed.",
         );
     }
     if asks(Question::Coupling) {
@@ -109,7 +111,11 @@ pub fn sentence(summary: &Summary, group: &Ablation) -> String {
         cells.push(cell);
     }
     if let (Question::Share, Some(left)) = (group.question, group.left()) {
-        rest.push(format!("left to interactions when all shares are taken off: {}", with_interval(&left, percent)));
+        rest.push(format!(
+            "left when all shares are taken off: {} (interactions, and what {} points missed)",
+            with_interval(&left, percent),
+            group.spp
+        ));
     }
     if group.question == Question::Coupling && group.parts.len() == 2 && group.absent.is_empty() {
         rest.push("two decisions are one pair, parted from either side".to_owned());
@@ -124,40 +130,66 @@ pub fn sentence(summary: &Summary, group: &Ablation) -> String {
 
 /// Where the error comes from, in words.
 fn verdict(source: &Source, group: &Ablation, at: &str) -> String {
-    let others = |named: &[usize]| -> String {
-        let rest: Vec<usize> = (0..group.parts.len()).filter(|i| !named.contains(i)).collect();
-        if rest.is_empty() { String::new() } else { format!("; less: {}", told_all(&rest, group)) }
-    };
-    let (from, one_alone) = match group.question {
-        Question::Share => ("the error comes from", "well-spread points for it alone take"),
-        Question::Coupling => ("the coupling's error comes from", "an order of its own for it alone takes"),
-        Question::Exchange => ("what can be gained lies in", "the exchange of it alone takes"),
+    let what = match group.question {
+        Question::Share => "the error comes from",
+        Question::Coupling => "the coupling's error comes from",
+        Question::Exchange => "what can be gained lies in",
     };
     match source {
-        Source::One(i) => {
-            let part = &group.parts[*i];
-            let more = if group.parts.len() > 1 { ", more than any other" } else { "" };
-            format!(
-                "**in {at} {from} the {}**: {one_alone} {} of the MSE away{more}{}",
-                part.decision.name(),
-                with_interval(&part.gone, percent),
-                others(&[*i])
-            )
-        }
+        Source::One(i) => one(*i, group, at, what),
         Source::Among(several) => {
             let names: Vec<&str> = several.iter().map(|&i| group.parts[i].decision.name()).collect();
+            let others: Vec<usize> = (0..group.parts.len()).filter(|i| !several.contains(i)).collect();
             format!(
-                "in {at} {from} the {}; which of them **cannot be told**: {one_alone} of the MSE {}{}",
+                "in {at} {what} the {}, **cannot tell which**: of the MSE goes, each alone, {}{}",
                 names.join(" or the "),
                 told_all(several, group),
-                others(several)
+                clause("less", &others, group)
             )
         }
-        Source::Nothing(_) => format!(
-            "in {at} **no decision alone** is seen to lower the error: of the MSE goes {}",
-            told_all(0..group.parts.len(), group)
-        ),
+        Source::Nothing(_) => {
+            let all = told_all(0..group.parts.len(), group);
+            match group.parts.iter().all(|part| below(&part.gone, 0.0) == Answer::Yes) {
+                true => {
+                    format!("in {at} **the error grows whichever decision is exchanged alone**: of the MSE goes {all}")
+                }
+                false => format!("in {at} **no decision alone** is seen to lower the error: of the MSE goes {all}"),
+            }
+        }
     }
+}
+
+/// The decision that takes the most away, what is near it, and the rest.
+fn one(i: usize, group: &Ablation, at: &str, what: &str) -> String {
+    let largest = &group.parts[i];
+    let (near, less): (Vec<usize>, Vec<usize>) = (0..group.parts.len())
+        .filter(|&other| other != i)
+        .partition(|&other| is_almost_as_much(&group.parts[other].gone, &largest.gone));
+    let also: Vec<&str> = near.iter().map(|&j| group.parts[j].decision.name()).collect();
+    let also = if also.is_empty() { String::new() } else { format!(" and, almost as much, the {}", listed(&also)) };
+    let alone = match group.question {
+        Question::Share => "well-spread points for it alone take",
+        Question::Coupling => "an order of its own for it alone takes",
+        Question::Exchange => "the exchange of it alone takes",
+    };
+    let more = if group.parts.len() > 1 { ", more than any other" } else { "" };
+    format!(
+        "**in {at} {what} the {}{also}**: {alone} {} of the MSE away{more}{}{}",
+        largest.decision.name(),
+        with_interval(&largest.gone, percent),
+        clause("almost as much", &near, group),
+        clause("less", &less, group)
+    )
+}
+
+/// At least four fifths, by the whole of both intervals.
+fn is_almost_as_much(gone: &Estimate, largest: &Estimate) -> bool {
+    gone.ci95.zip(largest.ci95).is_some_and(|([low, _], [_, high])| low >= 0.8 * high)
+}
+
+/// `; less: lens 13 % [9.0 %, 18 %]`, nothing of none.
+fn clause(words: &str, parts: &[usize], group: &Ablation) -> String {
+    if parts.is_empty() { String::new() } else { format!("; {words}: {}", told_all(parts, group)) }
 }
 
 fn capital(text: &str) -> String {
@@ -190,7 +222,7 @@ fn shares_table(summary: &Summary, found: &[(usize, Vec<Ablation>)], page: &mut 
         .collect();
     let mut head = vec!["scene", "one decision from → to", "spp"];
     head.extend(Decision::ALL.map(Decision::name));
-    head.extend(["all at once", "left to interactions"]);
+    head.extend(["all at once", "left"]);
     page.table(&head, &lines);
 }
 

@@ -163,9 +163,17 @@ fn sampler_row(summary: &Summary, i: usize) -> Vec<String> {
     let is_random = Decision::ALL.iter().any(|&decision| set.of(decision).is_random());
     let random = if is_random { "yes" } else { "no" };
     let taken = Decision::ALL.iter().filter(|d| d.dimensions() == 2).map(|&d| set.of(d).taken(26)).max().unwrap_or(26);
-    let describe = match set.single() {
-        Some(spec) => spec.describe(),
-        None => "A sampler for each decision.".to_owned(),
+    let (most, odd) = set.majority();
+    let exceptions: Vec<String> = odd.iter().map(|&d| format!("{}: {}", d.name(), set.of(d).expansion())).collect();
+    let (meaning, describe) = match set.single() {
+        Some(spec) => (spec.expansion(), spec.describe()),
+        None => (
+            format!("{}; {}", most.expansion(), exceptions.join("; ")),
+            format!(
+                "A sampler for each decision: all read the first but {}.",
+                listed(&odd.iter().map(|d| format!("the {}", d.name())).collect::<Vec<_>>())
+            ),
+        ),
     };
-    vec![names, set.expansion(), describe, random.to_owned(), taken.to_string()]
+    vec![names, meaning, describe, random.to_owned(), taken.to_string()]
 }
