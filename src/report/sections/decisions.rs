@@ -5,12 +5,12 @@ use crate::stats::Estimate;
 
 use super::super::ablation::{Ablation, Part, Question, Source, ablations};
 use super::super::evidence::{Answer, below};
-use super::super::markdown::Page;
-use super::super::numbers::{listed, percent, with_interval};
+use super::super::markdown::{Page, table_ref};
+use super::super::numbers::{counted, listed, percent, with_interval};
 use super::super::summarise::{Cell, Summary};
 use super::super::write::Figures;
-use super::words::{name, rows, scene_name};
-use super::{show, titles};
+use super::words::{level, name, rows, scene_name};
+use super::{show, tabulate, titles};
 
 /// The section; nothing where no set of samplers was compared.
 pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
@@ -29,13 +29,14 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
     explain(&found, page);
     let items: Vec<String> = found.iter().flat_map(|(scene, groups)| scene_items(summary, *scene, groups)).collect();
     page.bullets(&items);
-    show(
-        page,
-        figures,
-        "which-decision",
-        true,
-        "Share of the MSE that goes where one decision alone reads another sampler, with its 95 % interval, and where all do; below 0 the error grew.",
+    let caption = format!(
+        "Share of the MSE that goes where one decision alone reads another sampler, and where all do, with 95 % intervals, {} spp, {}; below 0 the error grew. \
+         A row a scene, a column an exchange; what a scene does not decide is not there. Numbers in {}.",
+        counts(&found),
+        counted(summary.about.experiment.replicates as usize, "replicate", "replicates"),
+        table_ref("which-decision")
     );
+    show(page, figures, "which-decision", true, &caption);
     shares_table(summary, &found, page);
 }
 
@@ -223,7 +224,19 @@ fn shares_table(summary: &Summary, found: &[(usize, Vec<Ablation>)], page: &mut 
     let mut head = vec!["scene", "one decision from → to", "spp"];
     head.extend(Decision::ALL.map(Decision::name));
     head.extend(["all at once", "left"]);
-    page.table(&head, &lines);
+    let caption = format!(
+        "Share of the MSE that goes, 1 − MSE/MSE before (no unit), where one decision alone reads another sampler, and where all do at once; {}. *Left*: what remains \
+         of 100 % when the single shares are taken off.",
+        level(summary)
+    );
+    tabulate(page, "which-decision", &caption, &head, &lines);
+}
+
+/// The counts of samples that were compared, in words.
+fn counts(found: &[(usize, Vec<Ablation>)]) -> String {
+    let counts: std::collections::BTreeSet<u32> =
+        found.iter().flat_map(|(_, groups)| groups).map(|group| group.spp).collect();
+    listed(&counts.iter().map(u32::to_string).collect::<Vec<_>>())
 }
 
 /// One line for the answer box: what independent points say of each scene, else what there is.
