@@ -691,18 +691,9 @@ fn a_decision_s_own_sampler_is_recorded_whole_and_changes_the_picture() {
     let (_, provenance) = read_exr(&folder.path("lens.exr")).unwrap();
     assert!(provenance.contains(&("sampler".to_owned(), text.to_owned())), "{provenance:?}");
     // The same set as one text, or by overriding what is overridden, is the same image.
-    run(&[
-        "--out",
-        "text.exr",
-        "--sampler",
-        "uniform",
-        "--pixel",
-        "ld:sheet",
-        "--lens",
-        "stratified",
-        "--light",
-        "ld:sheet",
-    ]);
+    let one_by_one = ["--pixel", "ld:sheet", "--lens", "stratified", "--light-pick", "ld:sheet", "--light", "ld:sheet"];
+    let base = ["render", "a.json", "--sampler", "uniform", "--spp", "26", "--quiet", "--out", "text.exr"];
+    folder.run(&[&base[..], &one_by_one].concat()).fine();
     let pixels = |name: &str| read_exr(&folder.path(name)).unwrap().0.pixels;
     assert!(pixels("text.exr") == pixels("lens.exr") && pixels("plain.exr") != pixels("lens.exr"));
     let text_form = ["render", "a.json", "--sampler", text, "--spp", "26", "--quiet", "--out", "form.exr"];

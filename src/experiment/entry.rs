@@ -93,7 +93,7 @@ impl SamplerEntry {
 }
 
 /// `pixel=A lens=B light-pick=C light=D`.
-pub(super) fn set_text(by_decision: &[String; 4]) -> String {
+fn set_text(by_decision: &[String; 4]) -> String {
     let part = |d: Decision| format!("{}={}", d.key(), by_decision[d as usize]);
     Decision::ALL.map(part).join(" ")
 }

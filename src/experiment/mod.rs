@@ -9,6 +9,7 @@
 //! | rows | [`results`] | typed lines of `results.jsonl` |
 
 pub mod backend;
+mod compared;
 mod entry;
 mod exact;
 pub mod execute;

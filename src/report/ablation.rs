@@ -80,7 +80,7 @@ pub fn ablations(summary: &Summary, scene: usize) -> Vec<Ablation<'_>> {
     if decisions.len() < 2 {
         return Vec::new();
     }
-    let mut groups: Vec<(usize, SamplerSpec, Vec<(Decision, usize)>)> = Vec::new();
+    let mut groups: Vec<Group> = Vec::new();
     for (sampler, set) in mixed {
         // Of two decisions each is the other's exchange: the base that is named first counts.
         let exchange = bases.iter().find_map(|(base, base_set)| match set.differing(base_set, decisions)[..] {
@@ -88,33 +88,31 @@ pub fn ablations(summary: &Summary, scene: usize) -> Vec<Ablation<'_>> {
             _ => None,
         });
         let Some((base, decision)) = exchange else { continue };
-        let other = set.of(decision);
-        let part = (decision, sampler);
-        match groups.iter_mut().find(|(b, o, _)| (*b, *o) == (base, other)) {
-            Some((.., parts)) if parts.iter().all(|(d, _)| *d != decision) => parts.push(part),
+        let (other, part) = (set.of(decision), (decision, sampler));
+        match groups.iter_mut().find(|group| (group.base, group.other) == (base, other)) {
+            Some(Group { parts, .. }) if parts.iter().all(|(d, _)| *d != decision) => parts.push(part),
             Some(_) => {}
-            None => groups.push((base, other, vec![part])),
+            None => groups.push(Group { base, other, parts: vec![part] }),
         }
     }
-    groups.sort_by_key(|(base, ..)| *base);
-    let end = |other: &SamplerSpec| {
-        let is_end = |(_, set): &&(usize, SamplerSet)| set.differing(&(*other).into(), decisions).is_empty();
+    groups.sort_by_key(|group| group.base);
+    let end = |other: SamplerSpec| {
+        let is_end = |(_, set): &&(usize, SamplerSet)| set.differing(&other.into(), decisions).is_empty();
         bases.iter().find(is_end).map(|(sampler, _)| *sampler)
     };
-    groups
-        .into_iter()
-        .filter_map(|(base, other, parts)| ablation(summary, scene, (base, other), parts, end(&other)))
-        .collect()
+    groups.into_iter().filter_map(|group| ablation(summary, scene, end(group.other), group)).collect()
 }
 
-/// One group at the largest count that all of it share.
-fn ablation(
-    summary: &Summary,
-    scene: usize,
-    (base, other): (usize, SamplerSpec),
-    mut parts: Vec<(Decision, usize)>,
-    end: Option<usize>,
-) -> Option<Ablation<'_>> {
+/// Sets that each exchange one decision of the same base for the same sampler, by index.
+struct Group {
+    base: usize,
+    other: SamplerSpec,
+    parts: Vec<(Decision, usize)>,
+}
+
+/// One group, with the sampler that stands at its other end, at the largest count that all of it share.
+fn ablation(summary: &Summary, scene: usize, end: Option<usize>, group: Group) -> Option<Ablation<'_>> {
+    let Group { base, other, mut parts } = group;
     parts.sort_by_key(|(decision, _)| *decision);
     let cell = |sampler: usize, spp: u32| summary.cell(scene, sampler, spp).filter(|cell| cell.mse.value > 0.0);
     let all_there = |spp: &u32| parts.iter().map(|(_, s)| *s).chain([base]).all(|s| cell(s, *spp).is_some());
@@ -124,8 +122,8 @@ fn ablation(
         let cell = cell(sampler, spp)?;
         Some((cell, gone(&ratio(&cell.mse, &base_cell.mse)?)))
     };
-    let before = summary.samplers[base].set?.single_of(&summary.scenes[scene].decisions)?;
-    let decisions = summary.scenes[scene].decisions.iter().copied();
+    let decisions = &summary.scenes[scene].decisions;
+    let before = summary.samplers[base].set?.single_of(decisions)?;
     Some(Ablation {
         scene,
         base,
@@ -133,7 +131,7 @@ fn ablation(
         question: question(&before, &other),
         spp,
         base_cell,
-        absent: decisions.filter(|d| parts.iter().all(|(done, _)| done != d)).collect(),
+        absent: decisions.iter().copied().filter(|d| parts.iter().all(|(done, _)| done != d)).collect(),
         all: end.and_then(exchanged),
         parts: parts
             .iter()

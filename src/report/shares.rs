@@ -89,7 +89,7 @@ fn drawn(frame: &Frame, panels: &[Option<SharePanel>], columns: usize) -> Drawin
             let left = names + i as f64 * width;
             let axis = Axis { low, left, right: left + width - NUMBER };
             if let Some(panel) = panel {
-                draw_panel(&mut drawing, &axis, panel, top, (i == 0).then_some(names));
+                draw_panel(&mut drawing, &axis, panel, (top, top + height - GAP), i == 0);
             }
         }
         top += height;
@@ -102,25 +102,25 @@ fn drawn(frame: &Frame, panels: &[Option<SharePanel>], columns: usize) -> Drawin
     drawing
 }
 
-fn draw_panel(drawing: &mut Drawing, axis: &Axis, panel: &SharePanel, top: f64, names: Option<f64>) {
+/// A panel from `top` to `bottom`, those of its whole row; `is_named`: the decisions stand to its left.
+fn draw_panel(drawing: &mut Drawing, axis: &Axis, panel: &SharePanel, (top, bottom): (f64, f64), is_named: bool) {
     let room = axis.right - axis.left + NUMBER - 10.0;
     drawing.heading((axis.left, top + 14.0), &shortened(&panel.title, HEADING, true, room));
     let first = top + TITLE_STEP;
-    let bottom = first + BAR * panel.bars.len() as f64;
     let ticks = axis.ticks();
     let spans: Vec<(f64, f64)> =
         ticks.iter().map(|&tick| (axis.pixel(tick), text_width(&percent(tick), TICK, false))).collect();
-    for ((&tick, &(x, _)), is_named) in ticks.iter().zip(&spans).zip(kept_apart(&spans, 5.0)) {
+    for ((&tick, &(x, _)), is_shown) in ticks.iter().zip(&spans).zip(kept_apart(&spans, 5.0)) {
         let colour = if tick == 0.0 { PALE } else { GRID };
         drawing.line(&[(x, first), (x, bottom)], 1.0, colour, Dash::Solid);
-        if is_named {
+        if is_shown {
             drawing.text((x, bottom + 12.0), &percent(tick), TICK, GREY, Align::Centre);
         }
     }
     for (i, bar) in panel.bars.iter().enumerate() {
         let y = first + BAR * (i as f64 + 0.5);
         draw_bar(drawing, axis, bar, y);
-        if names.is_some() {
+        if is_named {
             drawing.text((axis.left - 8.0, y + 4.0), name(bar), SMALL, INK, Align::Right);
         }
     }

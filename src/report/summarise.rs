@@ -350,8 +350,11 @@ fn samplers(experiment: &Experiment) -> Vec<SamplerSummary> {
             }
             None => {
                 // A name of one's own is kept as it is.
-                let label =
-                    if matches!(entry, SamplerEntry::Set { .. }) { name.clone() } else { label(&[name.clone()]) };
+                let label = if matches!(entry, SamplerEntry::Set { .. }) {
+                    name.clone()
+                } else {
+                    label(std::slice::from_ref(&name))
+                };
                 let style = look(&label, set.as_ref());
                 samplers.push(SamplerSummary { canonical, names: vec![name], label, set, style });
             }

@@ -5,7 +5,7 @@ use crate::stats::Estimate;
 
 use super::super::ablation::{Ablation, Part, Question, Source, ablations};
 use super::super::evidence::{Answer, below};
-use super::super::markdown::{Page, table_ref};
+use super::super::markdown::{Page, figure_ref, table_ref};
 use super::super::numbers::{counted, listed, percent, with_interval};
 use super::super::summarise::{Cell, Summary};
 use super::super::write::Figures;
@@ -27,14 +27,18 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
         return;
     }
     explain(&found, page);
+    page.paragraph(&format!(
+        "All shares side by side: {}, drawn in {}.",
+        table_ref("which-decision"),
+        figure_ref("which-decision")
+    ));
     let items: Vec<String> = found.iter().flat_map(|(scene, groups)| scene_items(summary, *scene, groups)).collect();
     page.bullets(&items);
     let caption = format!(
         "Share of the MSE that goes where one decision alone reads another sampler, and where all do, with 95 % intervals, {} spp, {}; below 0 the error grew. \
-         A row a scene, a column an exchange; what a scene does not decide is not there. Numbers in {}.",
+         A row a scene, a column an exchange; what a scene does not decide is not there.",
         counts(&found),
-        counted(summary.about.experiment.replicates as usize, "replicate", "replicates"),
-        table_ref("which-decision")
+        counted(summary.about.experiment.replicates as usize, "replicate", "replicates")
     );
     show(page, figures, "which-decision", true, &caption);
     shares_table(summary, &found, page);
@@ -154,7 +158,9 @@ fn verdict(source: &Source, group: &Ablation, at: &str) -> String {
                 true => {
                     format!("in {at} **the error grows whichever decision is exchanged alone**: of the MSE goes {all}")
                 }
-                false => format!("in {at} **no decision alone** is seen to lower the error: of the MSE goes {all}"),
+                false => format!(
+                    "in {at} **no decision alone** is seen, at the joint level, to lower the error: of the MSE goes {all}"
+                ),
             }
         }
     }
