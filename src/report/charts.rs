@@ -196,7 +196,7 @@ pub fn which_decision(summary: &Summary) -> Option<Figure> {
         rows.flat_map(|groups| columns.iter().map(|c| of_column(groups, c)).collect::<Vec<_>>()).collect();
     let spp: BTreeSet<u32> = groups.iter().flatten().map(|group| group.spp).collect();
     let spp: Vec<String> = spp.iter().map(u32::to_string).collect();
-    let exchange = |(base, other): &(usize, SamplerSpec)| format!("{} → {other}", summary.samplers[*base].label);
+    let exchange = |(base, other): &(usize, SamplerSpec)| format!("from {} to {other}", summary.samplers[*base].label);
     let exchanges: Vec<String> = columns.iter().map(exchange).collect();
     let subtitle = format!(
         "one decision at a time {}; {} spp, {}, 95 % intervals",
