@@ -381,6 +381,21 @@ const BAD_ARGUMENTS: &[(&[&str], &[&str])] = &[
     (&["measure", "halten"], &["sampler \"halten\"", "nor is there a file \"halten\""]),
     (&["measure", "none.csv"], &["none.csv: expected a readable CSV file", "found"]),
     (&["measure", "halton", "-n", "0"], &["'0' for '-n <N>'", "1..=16777216"]),
+    (
+        &["render", "a.json", "--lens", "halten"],
+        &["--lens: sampler \"halten\"", "expected a point set", "did you mean \"halton\"?"],
+    ),
+    (&["render", "a.json", "--light", "center"], &["expected a sampler with numbers", "\"light point\""]),
+    (&["render", "a.json", "--light_pick", "ld"], &["'--light_pick'", "'--light-pick'"]),
+    (
+        &["render", "a.json", "--sampler", "pixel=ld lens=ld light=ld"],
+        &["samplers \"pixel=ld", "expected a sampler for each of the decisions", "found none for light-pick"],
+    ),
+    (
+        &["render", "a.json", "--sampler", "pixel=ld lense=ld light-pick=ld light=ld"],
+        &["expected a decision (pixel, lens, light-pick, light)", "did you mean \"lens\"?"],
+    ),
+    (&["explain", "ld", "--pixel", "ldd"], &["--pixel: sampler \"ldd\"", "expected a point set"]),
     (&["explain", "halten"], &["sampler \"halten\"", "did you mean \"halton\"?"]),
     (&["run", "none.json"], &["none.json: expected a readable JSON file", "found"]),
     (&["run", "a.json"], &["a.json: expected the key \"name\", found none"]),
@@ -661,6 +676,47 @@ fn a_render_says_what_it_did_in_json_alone_on_stdout() {
     assert!(pinhole["focal_depth"].is_null());
 }
 
+#[test]
+fn a_decision_s_own_sampler_is_recorded_whole_and_changes_the_picture() {
+    let folder = Folder::sound();
+    let common = ["render", "a.json", "--sampler", "ld:sheet", "--spp", "26", "--quiet", "--json"];
+    let run = |more: &[&str]| folder.run(&[&common[..], more].concat()).json();
+    let plain = run(&["--out", "plain.exr"]);
+    let lens = run(&["--out", "lens.exr", "--lens", "stratified"]);
+    let text = "pixel=ld:sheet lens=stratified:shuffle:jitter@each light-pick=ld:sheet light=ld:sheet";
+    assert_eq!(lens["sampler"], text);
+    assert_eq!(lens["samplers"]["lens"], "stratified:shuffle:jitter@each");
+    assert_eq!(lens["samplers"]["light_pick"], "ld:sheet");
+    assert_eq!((&plain["spp"]["taken"], &lens["spp"]["taken"]), (&26.into(), &28.into()));
+    let (_, provenance) = read_exr(&folder.path("lens.exr")).unwrap();
+    assert!(provenance.contains(&("sampler".to_owned(), text.to_owned())), "{provenance:?}");
+    // The same set as one text, or by overriding what is overridden, is the same image.
+    let one_by_one = ["--pixel", "ld:sheet", "--lens", "stratified", "--light-pick", "ld:sheet", "--light", "ld:sheet"];
+    let base = ["render", "a.json", "--sampler", "uniform", "--spp", "26", "--quiet", "--out", "text.exr"];
+    folder.run(&[&base[..], &one_by_one].concat()).fine();
+    let pixels = |name: &str| read_exr(&folder.path(name)).unwrap().0.pixels;
+    assert!(pixels("text.exr") == pixels("lens.exr") && pixels("plain.exr") != pixels("lens.exr"));
+    let text_form = ["render", "a.json", "--sampler", text, "--spp", "26", "--quiet", "--out", "form.exr"];
+    folder.run(&text_form).fine();
+    assert!(folder.bytes("form.exr") == folder.bytes("lens.exr"));
+    // Equal everywhere is the plain sampler, by name and by bytes.
+    let same = run(&["--out", "same.exr", "--pixel", "ld:sheet", "--light-pick", "ld:sheet"]);
+    assert_eq!(same["sampler"], "ld:sheet");
+    assert!(folder.bytes("same.exr") == folder.bytes("plain.exr"));
+}
+
+#[test]
+fn a_sampler_for_a_decision_that_the_scene_does_not_make_is_said_and_changes_nothing() {
+    let folder = Folder::sound();
+    let plain = ["render", "a.json", "--sampler", "ld", "--set", "camera.lens_radius=0", "--out"];
+    folder.run(&[&plain[..], &["plain.png"]].concat()).fine();
+    let ran = folder.run(&[&plain[..], &["lens.png", "--lens", "uniform", "--light", "ld"]].concat());
+    let note = "note: --lens: a.json makes no such decision (pixel 0–1, light point 2–3, 4 dimensions in all): nothing reads it";
+    assert!(ran.stderr.contains(note) && !ran.stderr.contains("note: --light"), "{}", ran.stderr);
+    ran.fine();
+    assert!(folder.bytes("plain.png") == folder.bytes("lens.png"));
+}
+
 /// The scene with lens, textures and 61 768 triangles, on 1, 2 and 7 threads.
 #[test]
 fn a_render_has_the_same_bytes_on_every_thread_count() {
@@ -732,6 +788,19 @@ fn explain_tells_what_each_decision_reads() {
     }
     let text = run_in(Path::new("."), &["explain", "stratified:sheet"]).fine();
     assert!(text.contains("stratified:step:jitter@each") && text.contains("26 → 28 = 4×7"), "{text}");
+    let scene = repository("configs/cornell.json");
+    let ran =
+        run_in(Path::new("."), &["explain", "ld:sheet", "--lens", "halton", "--light", "halton", "--scene", &scene]);
+    assert!(ran.stderr.contains("note: --lens: ") && !ran.stderr.contains("note: --light: "), "{}", ran.stderr);
+    let text = ran.fine();
+    for part in [
+        "pixel=ld:sheet lens=halton:joint:digits@each light-pick=ld:sheet light=halton:joint:digits@each\n",
+        "  light point  halton:joint:digits@each\n",
+        "  light point  Halton's bases 5 and 7\n",
+        "  lens         not decided in this scene: no numbers\n",
+    ] {
+        assert!(text.contains(part), "{part:?} is missing in: {text}");
+    }
 }
 
 #[test]

@@ -9,12 +9,12 @@ use sampler_lab::error::{Error, Result};
 use sampler_lab::experiment::backend::Size;
 use sampler_lab::film::{check_writable, write_exr, write_png};
 use sampler_lab::render::render_observed;
-use sampler_lab::sampling::{MAX_SAMPLES, PointSource, Preset, Sampler, SamplerSpec};
+use sampler_lab::sampling::{Decision, MAX_SAMPLES, PointSource, Sampler};
 use sampler_lab::scene::compile::{Scene, Stage};
 use sampler_lab::scene::config::Estimator;
 use serde_json::json;
 
-use super::{SceneArgs, WorkArgs, print_json};
+use super::{DecisionArgs, SceneArgs, WorkArgs, print_json};
 
 /// Arguments of `render`.
 #[derive(Args)]
@@ -27,6 +27,8 @@ pub struct Render {
     /// Sampler for every decision; a bare name means its :best
     #[arg(long, default_value = "sobol")]
     sampler: String,
+    #[command(flatten)]
+    decisions: DecisionArgs,
     /// Samples per pixel [default: the scene's sppx]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
     spp: Option<u32>,
@@ -54,7 +56,7 @@ pub struct Render {
 impl Render {
     /// Renders and writes the image.
     pub fn run(self) -> Result<()> {
-        let spec = SamplerSpec::parse(&self.sampler, Preset::Best)?;
+        let set = self.decisions.set(&self.sampler)?;
         let stage = Stage::ALL.into_iter().find(|s| s.name() == self.stage).ok_or_else(|| {
             Error::input("--stage", format!("expected start, aa, dof or final, found \"{}\"", self.stage))
         })?;
@@ -85,18 +87,21 @@ impl Render {
         let build_seconds = started.elapsed().as_secs_f64();
         self.work.warn(&loaded.warnings);
         self.work.warn(&scene.warnings);
+        self.work.warn(&self.decisions.notes(&self.scene, &scene.layout));
 
         let asked = self.spp.unwrap_or(framebuffer.sppx);
-        let sampler = Sampler::new(spec, &scene.layout, asked, self.seed)?;
+        let sampler = Sampler::new(set, &scene.layout, asked, self.seed)?;
         let samples = size.pixels() * u64::from(sampler.samples());
         if !self.work.quiet {
             let bytes = scene.bytes() as u64 + 24 * size.pixels();
             eprintln!(
-                "{} at {size}, {} samples a pixel of {} = {}; about {} MB",
+                "{} at {size}, {} samples a pixel of {}; about {} MB",
                 self.scene.display(),
                 sampler.samples(),
-                self.sampler,
-                spec.expansion(),
+                match set.single() {
+                    Some(spec) => format!("{} = {}", self.sampler, spec.expansion()),
+                    None => set.expansion(),
+                },
                 bytes / 1_000_000 + 1
             );
             eprintln!("{}: {}", stage.name(), scene.layout);
@@ -117,7 +122,7 @@ impl Render {
                 let provenance = [
                     text("version", &env!("CARGO_PKG_VERSION")),
                     text("scene", &self.scene.display()),
-                    text("sampler", &spec),
+                    text("sampler", &set),
                     text("spp", &sampler.samples()),
                     text("seed", &self.seed),
                     text("estimator", &estimator),
@@ -136,11 +141,14 @@ impl Render {
             );
         }
         if self.json {
+            let own = Decision::ALL.map(|d| (d.key().replace('-', "_"), json!(set.of(d).to_string())));
+            let samplers: serde_json::Map<String, serde_json::Value> = own.into_iter().collect();
             print_json(&json!({
                 "file": out.display().to_string(),
                 "scene": self.scene.display().to_string(),
-                "sampler": spec.to_string(),
-                "expansion": spec.expansion(),
+                "sampler": set.to_string(),
+                "samplers": samplers,
+                "expansion": set.expansion(),
                 "layout": scene.layout.to_string(),
                 "estimator": estimator,
                 "stage": stage.name(),

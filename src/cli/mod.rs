@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand};
 use sampler_lab::error::{Error, Result};
-use sampler_lab::sampling::{Decision, Points, Preset, SampleLayout, SamplerSpec};
+use sampler_lab::sampling::{Decision, Points, Preset, SampleLayout, SamplerSet, SamplerSpec};
 use sampler_lab::scene::compile::{Scene, Stage};
 use sampler_lab::scene::config::SceneConfig;
 use sampler_lab::scene::load::{self, LoadedScene, OpenOptions};
@@ -116,6 +116,57 @@ impl WorkArgs {
     }
 }
 
+/// A sampler for all decisions, and others for single ones.
+#[derive(Args)]
+struct DecisionArgs {
+    /// Sampler of the place in the pixel, in place of the one for every decision
+    #[arg(long, value_name = "SAMPLER")]
+    pixel: Option<String>,
+    /// Sampler of the place on the lens
+    #[arg(long, value_name = "SAMPLER")]
+    lens: Option<String>,
+    /// Sampler of the choice of a light
+    #[arg(long, value_name = "SAMPLER")]
+    light_pick: Option<String>,
+    /// Sampler of the place on the light
+    #[arg(long, value_name = "SAMPLER")]
+    light: Option<String>,
+}
+
+impl DecisionArgs {
+    fn of(&self, decision: Decision) -> Option<&str> {
+        match decision {
+            Decision::Pixel => self.pixel.as_deref(),
+            Decision::Lens => self.lens.as_deref(),
+            Decision::LightPick => self.light_pick.as_deref(),
+            Decision::LightPoint => self.light.as_deref(),
+        }
+    }
+
+    /// `sampler` for every decision, but for those that have one of their own.
+    fn set(&self, sampler: &str) -> Result<SamplerSet> {
+        let mut set = SamplerSet::parse(sampler, Preset::Best)?;
+        for decision in Decision::ALL {
+            if let Some(own) = self.of(decision) {
+                let spec = SamplerSpec::parse(own, Preset::Best)
+                    .map_err(|e| Error::input(format!("--{}", decision.key()), e))?;
+                set = set.with(decision, spec);
+            }
+        }
+        Ok(set)
+    }
+
+    /// What was said of decisions that are not made.
+    fn notes(&self, scene: &Path, layout: &SampleLayout) -> Vec<String> {
+        let idle = |d: &Decision| self.of(*d).is_some() && layout.find(*d).is_none();
+        let idle = Decision::ALL.into_iter().filter(idle);
+        let note = |d: Decision| {
+            format!("--{}: {} makes no such decision ({layout}): nothing reads it", d.key(), scene.display())
+        };
+        idle.map(note).collect()
+    }
+}
+
 /// Writes a result to stdout; a reader that has gone away ends the program quietly.
 fn print(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
@@ -182,6 +233,8 @@ impl Config {
 struct Explain {
     /// Sampler, as POINTS[:ORDER[:RANDOM[@SCOPE]]] or POINTS:PRESET
     sampler: String,
+    #[command(flatten)]
+    decisions: DecisionArgs,
     /// Scene whose decisions are shown
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
@@ -191,27 +244,43 @@ struct Explain {
 
 impl Explain {
     fn run(self) -> Result<()> {
-        let spec = SamplerSpec::parse(&self.sampler, Preset::Best)?;
-        let mut text = format!("{} = {}\n{}\n", self.sampler, spec.expansion(), spec.describe());
-        if spec.points == Points::Stratified {
+        let set = self.decisions.set(&self.sampler)?;
+        let mut text = match set.single() {
+            Some(spec) => format!("{} = {}\n{}\n", self.sampler, spec.expansion(), spec.describe()),
+            None => by_decision(&set),
+        };
+        if Decision::ALL.iter().any(|&d| d.dimensions() == 2 && set.of(d).points == Points::Stratified) {
             text += "A count without a factor pair a×b, b/a ≤ 2, is raised to the next that has one: 26 → 28 = 4×7.\n";
         }
         if let Some(path) = &self.scene {
             let loaded = self.files.open(path)?;
             let framebuffer = loaded.config.framebuffer;
             let scene = Scene::new(&loaded.config, loaded.mesh, (framebuffer.res_w, framebuffer.res_h), Stage::Final)?;
+            for note in self.decisions.notes(path, &scene.layout) {
+                eprintln!("note: {note}");
+            }
             text += &format!("\n{}: {}\n", path.display(), scene.layout);
-            text += &layout_table(&spec, &scene.layout);
+            text += &layout_table(&set, &scene.layout);
         }
         print(&text)
     }
 }
 
+/// What a set of different samplers does, decision by decision.
+fn by_decision(set: &SamplerSet) -> String {
+    let mut text = format!("{set}\nA sampler for each decision:\n");
+    for decision in Decision::ALL {
+        let spec = set.of(decision);
+        text += &format!("  {:<12} {}\n  {:<12} {}\n", decision.name(), spec.expansion(), "", spec.describe());
+    }
+    text
+}
+
 /// Decision by decision, what is read.
-fn layout_table(spec: &SamplerSpec, layout: &SampleLayout) -> String {
+fn layout_table(set: &SamplerSet, layout: &SampleLayout) -> String {
     let mut text = String::new();
     for claim in layout.claims() {
-        text += &format!("  {:<12} {}\n", claim.decision.name(), spec.reads(*claim));
+        text += &format!("  {:<12} {}\n", claim.decision.name(), set.of(claim.decision).reads(*claim));
     }
     for absent in Decision::ALL.iter().filter(|d| layout.find(**d).is_none()) {
         text += &format!("  {:<12} not decided in this scene: no numbers\n", absent.name());

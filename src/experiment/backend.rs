@@ -135,7 +135,12 @@ pub struct SceneFacts {
 impl SceneFacts {
     /// Whether a light is picked among several: only then does it matter whether the pick's probability is divided by.
     pub fn picks_lights(&self) -> bool {
-        self.layout.contains(Decision::LightPick.name())
+        self.decisions().contains(&Decision::LightPick)
+    }
+
+    /// The decisions that the scene makes, in order.
+    pub fn decisions(&self) -> Vec<Decision> {
+        Decision::named_in(&self.layout)
     }
 }
 
@@ -159,7 +164,7 @@ pub struct Algorithms {
 pub struct RenderRequest<'a> {
     /// Scene, by the name of its [`SceneFacts`].
     pub scene: &'a str,
-    /// Sampler in canonical form, for every decision.
+    /// Sampler, or set of samplers, in canonical form.
     pub sampler: &'a str,
     /// Samples per pixel asked for; the sampler takes [`Backend::taken`].
     pub spp: u32,
@@ -197,6 +202,18 @@ pub trait Backend {
     /// # Errors
     /// Kind `Input` with the legal combinations.
     fn parse_sampler(&self, text: &str) -> Result<String>;
+
+    /// Whether the sampler is a set of different ones for different decisions, so that it has no one point set.
+    fn is_mixed(&self, canonical: &str) -> bool {
+        let _ = canonical;
+        false
+    }
+
+    /// What the sampler means for the decisions that the scene makes: equal exactly where the numbers are equal there.
+    fn meaning(&self, canonical: &str, scene: &str) -> String {
+        let _ = scene;
+        canonical.to_owned()
+    }
 
     /// Whether another seed gives another image of the scene, or another point set where no scene is given. Without
     /// that there is nothing to replicate. It is a question about both: a sampler may draw for some decisions only.

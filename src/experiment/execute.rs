@@ -191,6 +191,7 @@ fn write_about(plan: &Plan, out: &Path, command: &str) -> Result<()> {
         experiment: plan.experiment.clone(),
         scenes: plan.scenes.clone(),
         notes: plan.notes.clone(),
+        left_out: plan.left_out.clone(),
     };
     let path = results::about_path(out);
     let mut text = serde_json::to_string_pretty(&about).map_err(|e| Error::write(&path, e))?;

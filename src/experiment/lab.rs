@@ -137,9 +137,15 @@ impl Lab {
     }
 }
 
-/// The sampler of a canonical text.
-fn spec(canonical: &str) -> Result<SamplerSpec> {
-    SamplerSpec::parse(canonical, Preset::Best)
+/// The samplers of a canonical text.
+fn set(canonical: &str) -> Result<SamplerSet> {
+    SamplerSet::parse(canonical, Preset::Best)
+}
+
+/// The one sampler of a canonical text.
+fn single(canonical: &str) -> Result<SamplerSpec> {
+    let mixed = || Error::input(format!("sampler {canonical:?}"), "expected one sampler, found one for each decision");
+    set(canonical)?.single().ok_or_else(mixed)
 }
 
 impl Backend for Lab {
@@ -167,26 +173,37 @@ impl Backend for Lab {
     }
 
     fn parse_sampler(&self, text: &str) -> Result<String> {
-        Ok(spec(text)?.to_string())
+        Ok(set(text)?.to_string())
+    }
+
+    fn is_mixed(&self, canonical: &str) -> bool {
+        set(canonical).is_ok_and(|set| set.single().is_none())
+    }
+
+    fn meaning(&self, canonical: &str, scene: &str) -> String {
+        let made = |opened: &Opened| opened.layout.claims().iter().map(|claim| claim.decision).collect::<Vec<_>>();
+        set(canonical).map_or_else(|_| canonical.to_owned(), |set| set.meaning(&self.with(scene, made)))
     }
 
     fn is_random(&self, canonical: &str, scene: Option<&str>) -> bool {
-        spec(canonical).is_ok_and(|spec| match scene {
-            Some(scene) => self.with(scene, |opened| SamplerSet::from(spec).is_random(&opened.layout)),
-            None => spec.is_random(),
-        })
+        match scene {
+            Some(scene) => set(canonical).is_ok_and(|set| self.with(scene, |opened| set.is_random(&opened.layout))),
+            None => single(canonical).is_ok_and(|spec| spec.is_random()),
+        }
     }
 
     fn taken(&self, canonical: &str, scene: Option<&str>, asked: u32) -> u32 {
-        spec(canonical).map_or(asked, |spec| match scene {
-            Some(scene) => self.with(scene, |opened| SamplerSet::from(spec).taken(asked, &opened.layout)),
-            None => spec.taken(asked),
-        })
+        match scene {
+            Some(scene) => {
+                set(canonical).map_or(asked, |set| self.with(scene, |opened| set.taken(asked, &opened.layout)))
+            }
+            None => single(canonical).map_or(asked, |spec| spec.taken(asked)),
+        }
     }
 
     fn check_sampler(&self, canonical: &str, scene: &str) -> Result<()> {
-        let spec = spec(canonical)?;
-        self.with(scene, |opened| Sampler::new(spec, &opened.layout, 1, 0).map(|_| ()))
+        let set = set(canonical)?;
+        self.with(scene, |opened| Sampler::new(set, &opened.layout, 1, 0).map(|_| ()))
     }
 
     fn check_variant(&self, scene: &str, variant: Variant) -> Result<()> {
@@ -228,13 +245,13 @@ impl Backend for Lab {
     fn render(&self, request: &RenderRequest) -> Result<Image> {
         self.prepare(request)?;
         let pool = self.pool(request.threads)?;
-        let spec = spec(request.sampler)?;
+        let set = set(request.sampler)?;
         self.with(request.scene, |opened| {
             let scene = &opened.compiled[&Compiled::new(request.stage, request.variant)];
             let pass = |number: u64, asked: u32| {
                 // The first pass draws what a single one would; a later one begins anew with numbers of its own.
                 let seed = if number == 0 { request.seed } else { derive(request.seed, &[number]) };
-                let sampler = Sampler::new(spec, &scene.layout, asked, seed)?;
+                let sampler = Sampler::new(set, &scene.layout, asked, seed)?;
                 let rendered = pool.install(|| render::render(scene, &sampler));
                 let rendered = rendered.map_err(|bad| Error::incomplete(request.scene, bad))?;
                 Ok((rendered.image, sampler.samples()))
@@ -267,7 +284,7 @@ impl Backend for Lab {
     }
 
     fn point_metrics(&self, canonical: &str, n: u32, seed: u64, metrics: &[String]) -> Result<PointMetrics> {
-        let set = point_set(spec(canonical)?, n, seed)?;
+        let set = point_set(single(canonical)?, n, seed)?;
         let points = Points::new_2d(&set).map_err(|e| Error::incomplete(canonical, e))?;
         metrics.iter().map(|name| Ok((name.clone(), point_metric(name, &points)?))).collect()
     }

@@ -9,6 +9,8 @@
 //! | rows | [`results`] | typed lines of `results.jsonl` |
 
 pub mod backend;
+mod compared;
+mod entry;
 mod exact;
 pub mod execute;
 pub mod identity;

@@ -10,8 +10,9 @@ mod variants;
 use std::collections::{HashMap, HashSet};
 
 use super::backend::{Algorithms, Backend, Estimator, SceneFacts, Size, Stage, Variant};
+use super::compared::{read_reference_sampler, read_samplers, same_in_a_scene};
 use super::identity::{Fingerprint, SeedOf};
-use super::results::{Count, Kind};
+use super::results::{Count, Kind, LeftOut};
 use super::spec::{Experiment, Pictures};
 use crate::error::{Error, Result, did_you_mean};
 use variants::{is_seeded_as_its_twin, probed_samplers};
@@ -251,6 +252,8 @@ pub struct Plan {
     pub items: Vec<WorkItem>,
     /// What the plan made of the experiment, in sentences for a reader.
     pub notes: Vec<String>,
+    /// Sets of samplers that are not done in a scene, because another one means the same there.
+    pub left_out: Vec<LeftOut>,
     positions: HashMap<String, usize>,
 }
 
@@ -325,6 +328,7 @@ pub fn plan(experiment: &Experiment, backend: &dyn Backend) -> Result<Plan> {
     let scenes = open_scenes(experiment, backend)?;
     let samplers = read_samplers(experiment, backend)?;
     let reference_sampler = read_reference_sampler(experiment, backend, &samplers, &scenes)?;
+    let left_out = same_in_a_scene(&scenes, &samplers, backend);
     for (scene, sampler) in scenes.iter().flat_map(|scene| samplers.iter().map(move |sampler| (scene, sampler))) {
         let place = |e: Error| Error::input(format!("{}: samplers: scene {}", experiment.place, scene.name), e);
         backend.check_sampler(&sampler.canonical, &scene.name).map_err(place)?;
@@ -335,6 +339,7 @@ pub fn plan(experiment: &Experiment, backend: &dyn Backend) -> Result<Plan> {
         experiment,
         backend,
         reference: &reference_sampler,
+        left_out: &left_out,
         is_shown: false,
         items: Vec::new(),
         ids: HashSet::new(),
@@ -356,7 +361,7 @@ pub fn plan(experiment: &Experiment, backend: &dyn Backend) -> Result<Plan> {
     refuse_equal_seeds(&items, &experiment.place)?;
     let positions: HashMap<String, usize> = items.iter().enumerate().map(|(i, item)| (item.id.clone(), i)).collect();
     assert_eq!(positions.len(), items.len(), "two items of one id");
-    Ok(Plan { experiment: experiment.clone(), scenes, samplers, reference_sampler, items, notes, positions })
+    Ok(Plan { experiment: experiment.clone(), scenes, samplers, reference_sampler, items, notes, left_out, positions })
 }
 
 /// Items that draw numbers have seeds of their own: an image must share no randomness with what it is compared with. An
@@ -398,51 +403,6 @@ fn open_scenes(experiment: &Experiment, backend: &dyn Backend) -> Result<Vec<Sce
     Ok(scenes)
 }
 
-/// Reads the compared samplers and puts texts that mean the same one together.
-fn read_samplers(experiment: &Experiment, backend: &dyn Backend) -> Result<Vec<PlannedSampler>> {
-    let mut samplers: Vec<PlannedSampler> = Vec::new();
-    for (i, text) in experiment.samplers.iter().enumerate() {
-        let canonical = read_sampler(text, &format!("samplers[{i}]"), experiment, backend)?;
-        match samplers.iter_mut().find(|known| known.canonical == canonical) {
-            Some(known) => known.names.push(text.clone()),
-            None => samplers.push(PlannedSampler { canonical, names: vec![text.clone()] }),
-        }
-    }
-    Ok(samplers)
-}
-
-/// Reads one sampler; the message says where in the experiment it stands.
-fn read_sampler(text: &str, key: &str, experiment: &Experiment, backend: &dyn Backend) -> Result<String> {
-    let place = |error: Error| Error { place: format!("{}: {key}: {}", experiment.place, error.place), ..error };
-    backend.parse_sampler(text).map_err(place)
-}
-
-/// Reads the reference's sampler, which has to be independent of everything compared.
-fn read_reference_sampler(
-    experiment: &Experiment,
-    backend: &dyn Backend,
-    samplers: &[PlannedSampler],
-    scenes: &[SceneFacts],
-) -> Result<PlannedSampler> {
-    let text = &experiment.reference.sampler;
-    let canonical = read_sampler(text, "reference.sampler", experiment, backend)?;
-    let refuse = |what: String| Err(Error::input(format!("{}: reference.sampler", experiment.place), what));
-    if let Some(compared) = samplers.iter().find(|sampler| sampler.canonical == canonical) {
-        let names = compared.names.join(" and ");
-        return refuse(format!(
-            "expected a sampler that is not compared, found {text:?}, which is {names}: {canonical}"
-        ));
-    }
-    let is_fixed = |scene: &&SceneFacts| !scene.exact_reference && !backend.is_random(&canonical, Some(&scene.name));
-    if let Some(scene) = scenes.iter().find(is_fixed) {
-        return refuse(format!(
-            "expected a sampler with something random in it, found {text:?}, which is {canonical}: both halves of {} would be one image",
-            scene.name
-        ));
-    }
-    Ok(PlannedSampler { canonical, names: vec![text.clone()] })
-}
-
 /// Every metric asked for has to be known.
 fn check_metrics(experiment: &Experiment, backend: &dyn Backend) -> Result<()> {
     let known = backend.point_metric_names();
@@ -472,6 +432,7 @@ struct Planner<'a> {
     experiment: &'a Experiment,
     backend: &'a dyn Backend,
     reference: &'a PlannedSampler,
+    left_out: &'a [LeftOut],
     /// Whether the items added now are looked at.
     is_shown: bool,
     items: Vec<WorkItem>,
@@ -490,6 +451,35 @@ impl Planner<'_> {
                 self.notes.push(what);
             }
         }
+        let is_set = |sampler: &&PlannedSampler| self.backend.is_mixed(&sampler.canonical);
+        let sets: Vec<&str> = samplers.iter().filter(is_set).map(|sampler| sampler.names[0].as_str()).collect();
+        if self.experiment.points.is_some() && !sets.is_empty() {
+            self.notes.push(format!("no point sets of {}: each has a sampler a decision", sets.join(", ")));
+        }
+    }
+
+    /// The samplers that are done in a scene.
+    fn done_in<'s>(&self, scene: &SceneFacts, samplers: &'s [PlannedSampler]) -> Vec<&'s PlannedSampler> {
+        let is_out = |canonical: &str| self.left_out.iter().any(|l| l.scene == scene.name && l.sampler == canonical);
+        samplers.iter().filter(|sampler| !is_out(&sampler.canonical)).collect()
+    }
+
+    /// Says which sets are not done in a scene.
+    fn note_left_out(&mut self, scene: &SceneFacts, samplers: &[PlannedSampler]) {
+        let names = |canonical: &str| {
+            let found = samplers.iter().find(|sampler| sampler.canonical == canonical);
+            found.map_or_else(|| canonical.to_owned(), |sampler| sampler.names.join(" = "))
+        };
+        let of_scene = self.left_out.iter().filter(|left_out| left_out.scene == scene.name);
+        let pairs: Vec<String> = of_scene.map(|l| format!("{} = {}", names(&l.sampler), names(&l.same_as))).collect();
+        if !pairs.is_empty() {
+            self.notes.push(format!(
+                "{}: not done, since they are the same for the decisions of this scene ({}): {}",
+                scene.name,
+                scene.layout,
+                pairs.join(", ")
+            ));
+        }
     }
 
     /// Says what becomes of replicates and spp in one scene.
@@ -497,7 +487,8 @@ impl Planner<'_> {
         if scene.exact_reference {
             self.notes.push(format!("{}: the reference is a closed form", scene.name));
         }
-        for sampler in samplers {
+        self.note_left_out(scene, samplers);
+        for sampler in self.done_in(scene, samplers) {
             let what = format!("{}, {}", scene.name, sampler.names.join(", "));
             if self.experiment.replicates > 1 && !self.backend.is_random(&sampler.canonical, Some(&scene.name)) {
                 self.notes.push(format!("{what}: nothing random, so 1 replicate and no variance"));
@@ -534,7 +525,7 @@ impl Planner<'_> {
     /// Point-set metrics of every sampler.
     fn add_points(&mut self, samplers: &[PlannedSampler]) {
         let Some(points) = &self.experiment.points else { return };
-        for sampler in samplers {
+        for sampler in samplers.iter().filter(|sampler| !self.backend.is_mixed(&sampler.canonical)) {
             for &asked in &points.n {
                 for replicate in 0..self.replicates(&sampler.canonical, None, points.replicates) {
                     self.add_point_set(&sampler.canonical, asked, replicate, &points.metrics);
@@ -567,7 +558,7 @@ impl Planner<'_> {
     fn add_statistics(&mut self, scene: &SceneFacts, size: Size, samplers: &[PlannedSampler], probed: &[String]) {
         self.note_scene(scene, samplers);
         let reference_id = self.add_reference(scene, size, self.experiment.reference.spp, "reference");
-        for sampler in samplers {
+        for sampler in self.done_in(scene, samplers) {
             self.add_shortcut_of(scene, size, sampler, &reference_id);
             if probed.contains(&sampler.canonical) {
                 self.add_stability_of(scene, size, sampler, &reference_id);
@@ -678,7 +669,7 @@ impl Planner<'_> {
     fn add_pictures(&mut self, scene: &SceneFacts, pictures: &Pictures, samplers: &[PlannedSampler]) {
         self.is_shown = true;
         let reference_id = self.add_reference(scene, pictures.size, pictures.reference_spp, "picture reference");
-        for sampler in samplers {
+        for sampler in self.done_in(scene, samplers) {
             let work = ImageWork {
                 kind: Kind::Picture,
                 scene: scene.name.clone(),

@@ -394,6 +394,20 @@ pub struct About {
     pub scenes: Vec<SceneFacts>,
     /// What the plan made of the experiment, in sentences.
     pub notes: Vec<String>,
+    /// Sets of samplers that are not done in a scene, because another one means the same there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<LeftOut>,
+}
+
+/// A set of samplers that means in one scene, for the decisions that the scene makes, the same as another one.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// Scene name.
+    pub scene: String,
+    /// The set in canonical form.
+    pub sampler: String,
+    /// The one that is done, in canonical form.
+    pub same_as: String,
 }
 
 /// Reads `results.jsonl`: all whole rows, in the order of the file.

@@ -9,7 +9,7 @@
 //! | `seed` | whole number of 64 bits; every randomisation is derived from it |
 //! | `scenes` | names of scene files in `configs/`, or paths that end in `.json` |
 //! | `size` | optional: `"WxH"` for all scenes, or `{"SCENE": "WxH"}`; a scene not named keeps its file's own |
-//! | `samplers` | texts `POINTS[:ORDER[:RANDOM[@SCOPE]]]` or `POINTS:PRESET`, or objects `{"points", "order", "random", "scope"}`; a bare name means `:best` |
+//! | `samplers` | texts `POINTS[:ORDER[:RANDOM[@SCOPE]]]` or `POINTS:PRESET`, or objects `{"points", "order", "random", "scope"}`; a bare name means `:best`; a sampler for each decision: `{"name", "sampler", "pixel", "lens", "light_pick", "light"}`, where `sampler` is what the decisions not named read (without it all four are needed) and `name` is what reports call it |
 //! | `spp` | samples per pixel, each 1 to 2^24 |
 //! | `replicates` | independent randomisations of each image; 1 is used where nothing is random |
 //! | `reference` | `{"sampler", "spp"}`: two independent halves of `spp` samples per pixel, by a randomised sampler that is not compared |
@@ -24,6 +24,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::backend::{Estimator, Size, Variant};
+pub use super::entry::SamplerEntry;
+use super::entry::sampler;
 use crate::error::{Error, Result};
 use crate::scene::json::{self, Item, Value, suggestion};
 
@@ -48,7 +50,7 @@ pub struct Experiment {
     /// Image sizes.
     pub size: Sizes,
     /// Samplers, as written.
-    pub samplers: Vec<String>,
+    pub samplers: Vec<SamplerEntry>,
     /// Samples per pixel.
     pub spp: Vec<u32>,
     /// Independent randomisations of each image.
@@ -204,7 +206,7 @@ impl Experiment {
         let seed = fields.need("seed", |item| item.integer(0..=u64::MAX))?;
         let scenes = fields.need("scenes", |item| texts(&item, "scene names"))?;
         let size = fields.or("size", Sizes::PerScene(BTreeMap::new()), |item| sizes(&item, &scenes))?;
-        let samplers = fields.need("samplers", |item| list(&item, "samplers", sampler))?;
+        let samplers = fields.need("samplers", |item| samplers(&item))?;
         let spp = fields.need("spp", |item| counts(&item, MOST_SPP))?;
         let replicates = fields.need("replicates", |item| count(&item, MOST_REPLICATES))?;
         let reference = fields.need("reference", |item| reference(&item))?;
@@ -278,33 +280,16 @@ fn texts(item: &Item, what: &str) -> Result<Vec<String>> {
     })
 }
 
-/// A sampler as text, or as `{"points", "order", "random", "scope"}`, of which later ones may be left out.
-fn sampler(item: &Item) -> Result<String> {
-    if !matches!(item.value, Value::Object(_)) {
-        return match item.text("a sampler: a text, or an object with points, order, random and scope")? {
-            "" => Err(item.unexpected("a text that is not empty")),
-            text => Ok(text.to_owned()),
-        };
-    }
-    let mut fields = item.fields()?;
-    let word = |item: Item| item.text("a word").map(str::to_owned);
-    let mut text = fields.need("points", word)?;
-    let [order, random, scope] = ["order", "random", "scope"].map(|key| fields.opt(key, word));
-    let (order, random, scope) = (order?, random?, scope?);
-    fields.finish()?;
-    let missing = |key: &str| item.unexpected(format!("\"{key}\" where a later part is given"));
-    match (&order, &random, &scope) {
-        (None, Some(_), _) | (None, _, Some(_)) => return Err(missing("order")),
-        (_, None, Some(_)) => return Err(missing("random")),
-        _ => {}
-    }
-    for (sign, part) in [(':', order), (':', random), ('@', scope)] {
-        if let Some(part) = part {
-            text.push(sign);
-            text.push_str(&part);
+/// The compared samplers; no two are called the same.
+fn samplers(item: &Item) -> Result<Vec<SamplerEntry>> {
+    let samplers = list(item, "samplers", SamplerEntry::read)?;
+    for (i, sampler) in samplers.iter().enumerate() {
+        if samplers[..i].iter().any(|other| other.name() == sampler.name()) {
+            let what = format!("expected a name of its own, found {:?} again", sampler.name());
+            return Err(Error::input(item.place.index(i), what));
         }
     }
-    Ok(text)
+    Ok(samplers)
 }
 
 /// A number of things, at least 1.
@@ -384,7 +369,7 @@ fn pictures(item: &Item, scenes: &[String], reference_spp: u32) -> Result<Pictur
 }
 
 /// `stability`. Whether its samplers are among the experiment's is a question of what they mean, so the plan asks it.
-fn stability(item: &Item, scenes: &[String], samplers: &[String]) -> Result<Stability> {
+fn stability(item: &Item, scenes: &[String], samplers: &[SamplerEntry]) -> Result<Stability> {
     let mut fields = item.fields()?;
     let spp = fields.need("spp", |item| count(&item, MOST_SPP))?;
     let scenes = fields.or("scenes", scenes.to_vec(), |item| {
@@ -394,7 +379,10 @@ fn stability(item: &Item, scenes: &[String], samplers: &[String]) -> Result<Stab
             Ok(scene.to_owned())
         })
     })?;
-    let samplers = fields.or("samplers", samplers.to_vec(), |item| list(&item, "samplers", sampler))?;
+    let samplers = {
+        let all = samplers.iter().map(|entry| entry.name().to_owned()).collect();
+        fields.or("samplers", all, |item| list(&item, "samplers", sampler))?
+    };
     fields.finish()?;
     Ok(Stability { spp, scenes, samplers })
 }
@@ -453,7 +441,7 @@ mod tests {
     }
 
     /// Each edit of a good file, and what the message has to say of it.
-    const BAD: [(&str, &str, &str); 34] = [
+    const BAD: [(&str, &str, &str); 36] = [
         ("\"seed\"", "\"sede\"", "expected the key \"seed\""),
         ("\"points\"", "\"pionts\"", "pionts: expected one of the keys"),
         ("\"points\"", "\"pionts\"", "did you mean \"points\"?"),
@@ -474,7 +462,13 @@ mod tests {
         ("\"6x4\"", "\"6x0\"", "size.box: expected a size such as"),
         ("\"6x4\"", "64", "size.box: expected a size such as"),
         ("{\"box\": \"6x4\"}", "12", "size: expected a size such as"),
-        ("\"ld:sheet\"", "{\"name\": \"x\"}", "samplers[1]: expected the key \"points\""),
+        ("\"ld:sheet\"", "{\"name\": \"x\"}", "samplers[1]: expected \"sampler\" or each of"),
+        ("\"ld:sheet\"", "{\"pionts\": \"x\"}", "samplers[1]: expected the key \"points\""),
+        (
+            "\"ld:sheet\"",
+            "{\"name\": \"uniform\", \"sampler\": \"ld\"}",
+            "samplers[1]: expected a name of its own, found \"uniform\" again",
+        ),
         (
             "\"ld:sheet\"",
             "{\"points\": \"ld\", \"random\": \"owen\"}",

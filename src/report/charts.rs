@@ -1,9 +1,12 @@
 //! The charts of a report, out of its summary.
 
+use std::collections::BTreeSet;
+
 use crate::experiment::results::Variant;
-use crate::sampling::{Points, Preset, point_set};
+use crate::sampling::{Points, Preset, SamplerSpec, point_set};
 use crate::stats::Estimate;
 
+use super::ablation::{Ablation, ablations};
 use super::bias_variance::{self, BiasVariance, Group, bias_variance_chart};
 use super::dots::{Dot, DotGroup, DotRow, dot_chart};
 use super::figure::{Figure, Rgb8};
@@ -13,6 +16,7 @@ use super::pareto::{Trial, pareto_chart};
 use super::pictures::{NamedPoints, point_set_contact_sheet};
 use super::plots::{Datum, Floor, Guide, Plot, Series, loglog_chart, small_multiples};
 use super::provenance;
+use super::shares::{Share, SharePanel, share_chart};
 use super::stability::{Against, count_against, passes_against};
 use super::summarise::{Subject, Summary};
 
@@ -28,6 +32,12 @@ fn frame(summary: &Summary, title: &str, subtitle: &str, axes: [&str; 2]) -> Fra
         y_label: axes[1].to_owned(),
         x_ticks: Vec::new(),
     }
+}
+
+/// The line of a sampler.
+fn series(summary: &Summary, sampler: usize, points: Vec<Datum>) -> Series {
+    let sampler = &summary.samplers[sampler];
+    Series { label: sampler.label.clone(), style: sampler.style, points }
 }
 
 fn ends(estimate: &Estimate) -> Option<(f64, f64)> {
@@ -64,7 +74,7 @@ pub fn discrepancy(summary: &Summary) -> Option<Figure> {
             };
             let sets = summary.point_sets.iter().filter(|set| set.sampler == sampler && set.metric == "star");
             let points: Vec<Datum> = sets.filter_map(datum).collect();
-            (!points.is_empty()).then(|| Series::of_sampler(&summary.samplers[sampler].label, points))
+            (!points.is_empty()).then(|| series(summary, sampler, points))
         })
         .collect();
     if series.is_empty() {
@@ -86,15 +96,21 @@ fn guide(slope: f64, label: &str) -> Guide {
 /// RMSE against samples per pixel, a panel a scene; where the literal reading was run, it has a row of its own.
 pub fn convergence(summary: &Summary) -> Option<Figure> {
     let is_literal = |sampler: usize| summary.samplers[sampler].label.ends_with(":sheet");
-    let (literal, other): (Vec<usize>, Vec<usize>) = (0..summary.samplers.len()).partition(|&i| is_literal(i));
+    let (mixed, single): (Vec<usize>, Vec<usize>) =
+        (0..summary.samplers.len()).partition(|&i| summary.samplers[i].is_mixed());
+    let (literal, other): (Vec<usize>, Vec<usize>) = single.into_iter().partition(|&i| is_literal(i));
     let with_uniform = |samplers: &[usize]| -> Vec<usize> {
         summary.uniform().into_iter().filter(|u| !samplers.contains(u)).chain(samplers.iter().copied()).collect()
     };
-    let rows: Vec<(&str, Vec<usize>)> = match (literal.is_empty(), other.is_empty()) {
+    let mut rows: Vec<(&str, Vec<usize>)> = match (literal.is_empty(), other.is_empty()) {
         (true, _) => vec![("", other)],
         (_, true) => vec![(": read literally", literal)],
         _ => vec![(": read literally", with_uniform(&literal)), (": decisions kept apart", with_uniform(&other))],
     };
+    if !mixed.is_empty() {
+        rows.push((": a sampler a decision", with_uniform(&mixed)));
+    }
+    rows.retain(|(_, samplers)| !samplers.is_empty());
     let panels: Vec<Plot> = rows
         .iter()
         .flat_map(|(words, samplers)| {
@@ -117,7 +133,7 @@ fn panel(summary: &Summary, scene: usize, samplers: &[usize], words: &str) -> Pl
             Some(Datum { x: f64::from(cell.spp.taken), y: rmse.value, interval: ends(&rmse) })
         };
         let points: Vec<Datum> = summary.cells_of(scene, sampler).iter().filter_map(datum).collect();
-        (!points.is_empty()).then(|| Series::of_sampler(&summary.samplers[sampler].label, points))
+        (!points.is_empty()).then(|| series(summary, sampler, points))
     };
     let scene = &summary.scenes[scene];
     let floor = scene.reference_rmse().filter(|&rmse| rmse > 0.0);
@@ -138,7 +154,8 @@ pub fn bias_and_variance(summary: &Summary) -> Option<Figure> {
             let row = |sampler: usize| {
                 let cell = summary.cell(scene, sampler, most)?;
                 let label = &summary.samplers[sampler].label;
-                Some(BiasVariance::of_sampler(label, estimate(cell.bias2), cell.variance.map(estimate)))
+                let row = BiasVariance::of_sampler(label, estimate(cell.bias2), cell.variance.map(estimate));
+                Some(BiasVariance { style: summary.samplers[sampler].style, ..row })
             };
             let rows = (0..summary.samplers.len()).filter_map(row).collect();
             Group { title: summary.scenes[scene].name.clone(), rows }
@@ -185,6 +202,46 @@ pub fn stability(summary: &Summary) -> Option<Figure> {
     Some(dot_chart(&frame, &kinds, 1.0, &groups))
 }
 
+/// Shares of the error that single decisions take away: a row a scene, a column an exchange; `None` where no decision was
+/// exchanged alone.
+pub fn which_decision(summary: &Summary) -> Option<Figure> {
+    let groups: Vec<Vec<Ablation>> = (0..summary.scenes.len()).map(|scene| ablations(summary, scene)).collect();
+    let mut columns: Vec<(usize, SamplerSpec)> = Vec::new();
+    for column in groups.iter().flatten().map(|group| (group.base, group.other)) {
+        if !columns.contains(&column) {
+            columns.push(column);
+        }
+    }
+    columns.sort_by_key(|(base, _)| *base);
+    if columns.is_empty() {
+        return None;
+    }
+    let panel = |group: &Ablation| {
+        let parts = group.parts.iter().map(|part| Share { decision: Some(part.decision), share: part.gone });
+        let all = group.all.iter().map(|(_, gone)| Share { decision: None, share: *gone });
+        let title = format!("{}: {}", summary.scenes[group.scene].name, summary.samplers[group.base].label);
+        SharePanel { title, bars: parts.chain(all).collect() }
+    };
+    let of_column = |groups: &[Ablation], column: &(usize, SamplerSpec)| {
+        groups.iter().find(|group| (group.base, group.other) == *column).map(panel)
+    };
+    let rows = groups.iter().filter(|groups| !groups.is_empty());
+    let panels: Vec<_> =
+        rows.flat_map(|groups| columns.iter().map(|c| of_column(groups, c)).collect::<Vec<_>>()).collect();
+    let spp: BTreeSet<u32> = groups.iter().flatten().map(|group| group.spp).collect();
+    let spp: Vec<String> = spp.iter().map(u32::to_string).collect();
+    let exchange = |(base, other): &(usize, SamplerSpec)| format!("from {} to {other}", summary.samplers[*base].label);
+    let exchanges: Vec<String> = columns.iter().map(exchange).collect();
+    let subtitle = format!(
+        "one decision at a time {}; {} spp, {}, 95 % intervals",
+        listed(&exchanges),
+        listed(&spp),
+        replicates(summary)
+    );
+    let axes = ["share of the MSE that goes where this decision alone is exchanged", ""];
+    Some(share_chart(&frame(summary, "Which decision matters", &subtitle, axes), &panels, columns.len()))
+}
+
 /// What the speed chart of a scene is called in `figures/`: letters, digits and `.-_` alone, so that every viewer finds it.
 pub fn speed_name(scene: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || ".-_".contains(c) { c } else { '-' };
@@ -202,6 +259,7 @@ pub fn speed(summary: &Summary, scene: usize) -> Option<Figure> {
             Some(Trial {
                 seconds_interval: ends(&speed.seconds),
                 error_interval: ends(&rmse),
+                style: summary.samplers[cell.sampler].style,
                 ..Trial::of_sampler(label, &detail, speed.seconds.value, rmse.value)
             })
         })

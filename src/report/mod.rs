@@ -13,11 +13,13 @@ pub mod pareto;
 pub mod pictures;
 pub mod plots;
 pub mod provenance;
+pub mod shares;
 pub mod stability;
 pub mod style;
 pub mod summarise;
 pub mod tables;
 
+mod ablation;
 mod axis;
 mod charts;
 mod labels;

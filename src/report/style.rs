@@ -3,6 +3,8 @@
 //! Colours are Okabe and Ito's, told apart by the colour-blind (<https://jfly.uni-koeln.de/color/>); a shape beside
 //! each makes a figure readable in grey.
 
+use crate::sampling::{Decision, Order, Points, SamplerSet};
+
 use super::figure::{Colour, Dash, Drawing, Place, regular};
 
 /// Ink of text and axes.
@@ -73,6 +75,26 @@ pub fn style_of(name: &str) -> Style {
     // A description in full is a variant beside the presets: the same shape, the colour mixed with black.
     let colour = if dash == Dash::DashDot { colour.map(|c: u8| (f64::from(c) * 0.55) as u8) } else { colour };
     Style { colour, marker, filled, dash }
+}
+
+/// The colour of a decision, wherever one is singled out: Tol's muted scheme (<https://sronpersonalpages.nl/~pault/>), also
+/// told apart by the colour-blind, and none of the families' colours.
+pub fn decision_colour(decision: Decision) -> Colour {
+    match decision {
+        Decision::Pixel => [51, 34, 136],
+        Decision::Lens => [68, 170, 153],
+        Decision::LightPick => [153, 153, 51],
+        Decision::LightPoint => [136, 34, 85],
+    }
+}
+
+/// The look of a set of different samplers: the shape is that of the sampler which most decisions read, hollow where that
+/// one walks in step; the colour is that of the one decision which reads another, purple where several do.
+pub fn style_of_set(set: &SamplerSet) -> Style {
+    let (most, odd) = set.majority();
+    let Style { marker, .. } = style_of(most.points.word());
+    let colour = if let [one] = odd[..] { decision_colour(one) } else { [204, 121, 167] };
+    Style { colour, marker, filled: most.points == Points::Uniform || most.order != Order::Step, dash: Dash::DashDot }
 }
 
 /// FNV-1a of the name picks a shape: stable from run to run, which a counter of names seen would not be.
@@ -149,6 +171,18 @@ mod tests {
         assert_eq!((best.dash, best.filled), (Dash::Solid, true));
         assert_eq!((plain.dash, long.dash), (Dash::Dotted, Dash::DashDot));
         assert_eq!(style_of("my points"), style_of("my points"));
+    }
+
+    #[test]
+    fn a_set_looks_like_what_most_decisions_read_in_the_colour_of_the_odd_one() {
+        let set = |text: &str| SamplerSet::parse(text, crate::sampling::Preset::Best).unwrap();
+        let lens = style_of_set(&set("pixel=ld:sheet lens=ld light-pick=ld:sheet light=ld:sheet"));
+        assert_eq!((lens.marker, lens.filled, lens.colour), (Marker::Diamond, false, decision_colour(Decision::Lens)));
+        let light = style_of_set(&set("pixel=uniform lens=uniform light-pick=uniform light=ld"));
+        assert_eq!((light.marker, light.filled), (Marker::Circle, true));
+        let two = style_of_set(&set("pixel=uniform lens=uniform light-pick=ld light=ld"));
+        assert!(Decision::ALL.iter().all(|&d| decision_colour(d) != two.colour && decision_colour(d) != [0; 3]));
+        assert_eq!(Decision::ALL.map(decision_colour).iter().collect::<std::collections::BTreeSet<_>>().len(), 4);
     }
 
     #[test]

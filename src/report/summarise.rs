@@ -10,11 +10,12 @@ use std::collections::HashMap;
 use crate::experiment::results::{
     About, Count, EnsembleRow, Estimator, ImageRow, Kind, PointsRow, ReferenceRow, Row, Timing, TwinDifference, Variant,
 };
-use crate::experiment::spec::Experiment;
-use crate::sampling::{Decision, Order, Points, Preset, Random, SamplerSpec, Scope};
+use crate::experiment::spec::{Experiment, SamplerEntry};
+use crate::sampling::{Decision, Order, Points, Preset, Random, SamplerSet, SamplerSpec, Scope};
 use crate::stats::{Estimate, SlopeFit, slope_with_interval, t_interval};
 
 use super::evidence::{Course, ratio, ratio_of_roots};
+use super::style::{Style, style_of, style_of_set};
 pub use variants::Subject;
 
 /// Counts that a slope of RMSE is fitted over: powers of two from 4 to 256 that the sampler takes as asked.
@@ -50,6 +51,8 @@ pub struct Summary {
     pub stages: Vec<ImageRow>,
     /// Times, where any were taken.
     pub speeds: Vec<Speed>,
+    /// Sets that are not compared in a scene: scene, sampler, and the sampler that means the same there.
+    pub left_out: Vec<(usize, usize, usize)>,
     /// What is not there, in words.
     pub missing: Vec<String>,
 }
@@ -61,6 +64,8 @@ pub struct SceneSummary {
     pub name: String,
     /// Its decisions and the dimensions they read, in words.
     pub layout: String,
+    /// Its decisions, in order.
+    pub decisions: Vec<Decision>,
     /// Whether there is a lens to sample.
     pub lens: bool,
     /// Whether its reference is a closed form.
@@ -89,20 +94,38 @@ pub struct SamplerSummary {
     pub names: Vec<String>,
     /// What figures and tables call it: the one name, or the family where several presets are one sampler.
     pub label: String,
-    /// What it does; `None` where this version cannot read its text.
-    pub spec: Option<SamplerSpec>,
+    /// What it does, decision by decision; `None` where this version cannot read its text.
+    pub set: Option<SamplerSet>,
+    /// Its look in every figure.
+    pub style: Style,
 }
 
 impl SamplerSummary {
-    /// Whether each pixel sees the same points, or one axis of them, so that neighbours may err alike.
+    /// What it does for every decision; `None` where decisions differ, or where this version cannot read its text.
+    pub fn spec(&self) -> Option<SamplerSpec> {
+        self.set.and_then(|set| set.single())
+    }
+
+    /// Whether `text` names it: as the experiment calls it, or by another text of the same meaning.
+    pub fn is_meant_by(&self, text: &str) -> bool {
+        let means = || SamplerSet::parse(text, Preset::Best).is_ok_and(|set| set.to_string() == self.canonical);
+        self.names.iter().any(|name| name == text) || means()
+    }
+
+    /// Whether it is a set of different samplers for different decisions.
+    pub fn is_mixed(&self) -> bool {
+        self.set.is_some_and(|set| set.single().is_none())
+    }
+
+    /// Whether each pixel sees the same points, or one axis of them, in some decision, so that neighbours may err alike.
     pub fn repeats_in_every_pixel(&self) -> bool {
-        let repeats = |spec: &SamplerSpec| {
+        let repeats = |spec: SamplerSpec| {
             let is_shared = matches!(spec.scope, Scope::Image | Scope::Decision);
             // Hammersley's x = i/n is untouched by a shift of y; a shuffle of the indices mixes it anew.
             let has_fixed_axis = spec.random == Random::Yxor && spec.order == Order::Step;
             !spec.is_random() || is_shared || has_fixed_axis
         };
-        self.spec.as_ref().is_some_and(repeats)
+        self.set.is_some_and(|set| Decision::ALL.iter().any(|&decision| repeats(set.of(decision))))
     }
 }
 
@@ -212,6 +235,16 @@ impl Summary {
         cells
     }
 
+    /// The sampler that means the same in a scene as `sampler`, which was left out there for that reason.
+    pub fn same_as(&self, scene: usize, sampler: usize) -> Option<usize> {
+        self.left_out.iter().find(|(s, out, _)| (*s, *out) == (scene, sampler)).map(|(.., same_as)| *same_as)
+    }
+
+    /// The samplers that are compared in a scene.
+    pub fn compared(&self, scene: usize) -> impl Iterator<Item = usize> + '_ {
+        (0..self.samplers.len()).filter(move |&sampler| self.same_as(scene, sampler).is_none())
+    }
+
     /// The slope of a scene and a sampler.
     pub fn slope(&self, scene: usize, sampler: usize) -> Option<&Slope> {
         self.slopes.iter().find(|s| s.scene == scene && s.sampler == sampler)
@@ -317,8 +350,10 @@ pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
         picture_reference: None,
         stages: index.stages.clone(),
         speeds: Vec::new(),
+        left_out: Vec::new(),
         missing: Vec::new(),
     };
+    summary.left_out = left_out(&summary, about);
     index.add_cells(&mut summary);
     add_slopes(&mut summary);
     index.add_stability(&mut summary);
@@ -329,25 +364,47 @@ pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
     summary
 }
 
-/// The experiment's samplers, texts that mean the same one together.
-fn samplers(experiment: &Experiment) -> Vec<SamplerSummary> {
-    samplers_of(&experiment.samplers)
+/// What the plan left out, by index.
+fn left_out(summary: &Summary, about: &About) -> Vec<(usize, usize, usize)> {
+    let scene = |name: &str| summary.scenes.iter().position(|scene| scene.name == name);
+    let sampler = |canonical: &str| summary.samplers.iter().position(|sampler| sampler.canonical == canonical);
+    let indices = about.left_out.iter().map(|l| Some((scene(&l.scene)?, sampler(&l.sampler)?, sampler(&l.same_as)?)));
+    indices.flatten().collect()
 }
 
-fn samplers_of(texts: &[String]) -> Vec<SamplerSummary> {
+/// The experiment's samplers, texts that mean the same one together.
+fn samplers(experiment: &Experiment) -> Vec<SamplerSummary> {
     let mut samplers: Vec<SamplerSummary> = Vec::new();
-    for text in texts {
-        let spec = SamplerSpec::parse(text, Preset::Best).ok();
-        let canonical = spec.map_or_else(|| text.clone(), |spec| spec.to_string());
+    for entry in &experiment.samplers {
+        let (text, name) = (entry.text(), entry.name().to_owned());
+        let set = SamplerSet::parse(&text, Preset::Best).ok();
+        let canonical = set.map_or(text, |set| set.to_string());
         match samplers.iter_mut().find(|known| known.canonical == canonical) {
-            Some(known) => known.names.push(text.clone()),
-            None => samplers.push(SamplerSummary { canonical, names: vec![text.clone()], label: String::new(), spec }),
+            Some(known) => {
+                known.names.push(name);
+                known.label = label(&known.names);
+            }
+            None => {
+                // A name of one's own is kept as it is.
+                let label = if matches!(entry, SamplerEntry::Set { .. }) {
+                    name.clone()
+                } else {
+                    label(std::slice::from_ref(&name))
+                };
+                let style = look(&label, set.as_ref());
+                samplers.push(SamplerSummary { canonical, names: vec![name], label, set, style });
+            }
         }
     }
     for sampler in &mut samplers {
-        sampler.label = label(&sampler.names);
+        sampler.style = look(&sampler.label, sampler.set.as_ref());
     }
     samplers
+}
+
+/// How a sampler looks in figures: by its name, or by its decisions where they differ.
+fn look(label: &str, set: Option<&SamplerSet>) -> Style {
+    set.filter(|set| set.single().is_none()).map_or_else(|| style_of(label), style_of_set)
 }
 
 /// One name for a sampler of several: the part before the first colon, where they share it.
@@ -449,6 +506,7 @@ impl<'a> Index<'a> {
         SceneSummary {
             name: facts.name.clone(),
             layout: facts.layout.clone(),
+            decisions: facts.decisions(),
             lens: facts.lens,
             has_closed_form: facts.exact_reference,
             size: size.to_string(),
@@ -461,7 +519,7 @@ impl<'a> Index<'a> {
     fn add_cells(&self, summary: &mut Summary) {
         let (mut missing, mut first) = (0, None);
         for scene in 0..summary.scenes.len() {
-            for sampler in 0..summary.samplers.len() {
+            for sampler in summary.compared(scene).collect::<Vec<_>>() {
                 for &asked in &summary.about.experiment.spp {
                     let (s, p) = (&summary.scenes[scene], &summary.samplers[sampler]);
                     match self.plain(s, p, asked) {
@@ -520,7 +578,7 @@ impl<'a> Index<'a> {
     fn add_points(&self, summary: &mut Summary) {
         let Some(points) = summary.about.experiment.points.clone() else { return };
         let (mut missing, mut expected) = (0, 0);
-        for sampler in 0..summary.samplers.len() {
+        for sampler in (0..summary.samplers.len()).filter(|&i| !summary.samplers[i].is_mixed()).collect::<Vec<_>>() {
             for &n in &points.n {
                 let p = &summary.samplers[sampler];
                 expected += 1;
@@ -528,7 +586,7 @@ impl<'a> Index<'a> {
                     missing += 1;
                     continue;
                 };
-                let is_fixed = p.spec.is_some_and(|spec| !spec.is_random());
+                let is_fixed = p.spec().is_some_and(|spec| !spec.is_random());
                 let of_metric = |metric: &String| point_set(sampler, metric, sets, is_fixed);
                 summary.point_sets.extend(points.metrics.iter().map(of_metric));
             }
@@ -545,9 +603,10 @@ impl<'a> Index<'a> {
             self.pictures.iter().find(|row| row.sampler == sampler.canonical && row.size == pictures.size)
         };
         let found: Vec<ImageRow> = summary.samplers.iter().filter_map(of).map(|&row| row.clone()).collect();
-        if found.len() < summary.samplers.len() {
-            let missing = summary.samplers.len() - found.len();
-            summary.missing.push(format!("{missing} of {} pictures", summary.samplers.len()));
+        let scene = summary.about.experiment.scenes.iter().position(|scene| *scene == pictures.scene);
+        let planned = scene.map_or(summary.samplers.len(), |scene| summary.compared(scene).count());
+        if found.len() < planned {
+            summary.missing.push(format!("{} of {planned} pictures", planned - found.len()));
         }
         let (stages, planned) = (summary.stages.len(), summary.stages_planned());
         if stages < planned {
@@ -574,10 +633,9 @@ impl<'a> Index<'a> {
     }
 }
 
-/// Whether another seed gives the same image: the sheet's 1-D samplers are jittered also where its 2-D ones are not.
+/// Whether another seed gives the same image of the scene.
 fn is_fixed(sampler: &SamplerSummary, scene: &SceneSummary) -> bool {
-    let has_1d = scene.layout.contains(Decision::LightPick.name());
-    sampler.spec.is_some_and(|spec| !(spec.is_random() || spec.sheet_1d && has_1d))
+    sampler.set.is_some_and(|set| !set.is_random_for(&scene.decisions))
 }
 
 fn point_set(sampler: usize, metric: &str, sets: &[&PointsRow], is_fixed: bool) -> PointSet {
@@ -603,7 +661,7 @@ fn median(mut values: Vec<f64>) -> Option<Estimate> {
 fn add_slopes(summary: &mut Summary) {
     let seed = summary.about.experiment.seed;
     for scene in 0..summary.scenes.len() {
-        for sampler in 0..summary.samplers.len() {
+        for sampler in summary.compared(scene).collect::<Vec<_>>() {
             let cells = summary.cells_of(scene, sampler);
             let is_usable = |cell: &&&Cell| {
                 SLOPE_COUNTS.contains(&cell.spp.asked)

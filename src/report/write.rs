@@ -107,6 +107,7 @@ fn draw(dir: &Path, summary: &Summary) -> Result<Figures> {
     pen.chart("convergence", charts::convergence(summary))?;
     pen.chart("bias-and-variance", charts::bias_and_variance(summary))?;
     pen.chart("stability", charts::stability(summary))?;
+    pen.chart("which-decision", charts::which_decision(summary))?;
     for (i, scene) in summary.scenes.iter().enumerate() {
         pen.chart(&charts::speed_name(&scene.name), charts::speed(summary, i))?;
     }

@@ -31,6 +31,29 @@ impl Decision {
             Self::LightPoint => "light point",
         }
     }
+
+    /// The word in texts and options: `pixel lens light-pick light`.
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Pixel => "pixel",
+            Self::Lens => "lens",
+            Self::LightPick => "light-pick",
+            Self::LightPoint => "light",
+        }
+    }
+
+    /// How many coordinates it reads: 1 or 2.
+    pub const fn dimensions(self) -> u32 {
+        match self {
+            Self::LightPick => 1,
+            Self::Pixel | Self::Lens | Self::LightPoint => 2,
+        }
+    }
+
+    /// The decisions that a layout's text names, in order: what a stored layout says without its tickets.
+    pub fn named_in(layout: &str) -> Vec<Self> {
+        Self::ALL.into_iter().filter(|decision| layout.contains(decision.name())).collect()
+    }
 }
 
 /// The right to read one coordinate.
@@ -144,6 +167,10 @@ mod tests {
         layout.claim_2d(Decision::LightPoint);
         assert_eq!(layout.to_string(), "pixel 0–1, light pick 2, light point 3–4, 5 dimensions in all");
         assert_eq!(layout.find(Decision::Lens), None);
+        let named = Decision::named_in(&layout.to_string());
+        assert_eq!(named, [Decision::Pixel, Decision::LightPick, Decision::LightPoint]);
+        assert!(layout.claims().iter().all(|claim| claim.count == claim.decision.dimensions()));
+        assert_eq!(Decision::named_in(&SampleLayout::default().to_string()), []);
     }
 
     #[test]

@@ -6,11 +6,13 @@ pub mod hash;
 mod layout;
 pub mod radical;
 mod sampler;
+mod set;
 pub mod sobol;
 mod spec;
 pub mod strata;
 pub mod warp;
 
 pub use layout::{Claim, Decision, Dim1, Dim2, SampleLayout};
-pub use sampler::{ALGORITHM, PixelKey, PointSource, Sampler, SamplerSet, point_set};
+pub use sampler::{ALGORITHM, PixelKey, PointSource, Sampler, point_set};
+pub use set::SamplerSet;
 pub use spec::{MAX_SAMPLES, Order, Points, Preset, Random, SamplerSpec, Scope, every_legal_spec};

@@ -3,6 +3,7 @@
 use super::hash::{Permutation, bits32, derive, mix64, unit_f32};
 use super::layout::{Claim, Decision, Dim1, Dim2, SampleLayout};
 use super::radical::{PRIMES, digit_count, digit_scrambled, radical_inverse, radical_inverse_f64};
+use super::set::{SamplerSet, sheet_1d};
 use super::sobol::{SobolAxis, owen_scramble};
 use super::spec::{MAX_SAMPLES, Order, Points, Random, SamplerSpec, Scope};
 use super::strata::{factor_pair, in_stratum, in_stratum_f64};
@@ -54,39 +55,6 @@ pub trait PointSource: Sync {
 pub struct Sampler {
     decisions: [Option<DecisionSampler>; 4],
     samples: u32,
-}
-
-/// Which sampler serves which decision.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SamplerSet {
-    by_decision: [SamplerSpec; 4],
-}
-
-impl From<SamplerSpec> for SamplerSet {
-    fn from(spec: SamplerSpec) -> Self {
-        Self { by_decision: [spec; 4] }
-    }
-}
-
-impl SamplerSet {
-    /// The sampler of a decision.
-    pub fn of(&self, decision: Decision) -> SamplerSpec {
-        self.by_decision[decision as usize]
-    }
-
-    /// Samples taken where `asked` are asked for, by the decisions that `layout` makes.
-    pub fn taken(&self, asked: u32, layout: &SampleLayout) -> u32 {
-        layout.claims().iter().map(|c| self.of(c.decision).taken(asked)).max().unwrap_or(asked)
-    }
-
-    /// Whether anything that `layout` uses is random.
-    pub fn is_random(&self, layout: &SampleLayout) -> bool {
-        layout.claims().iter().any(|c| {
-            let spec = self.of(c.decision);
-            // The sheet's 1-D samplers are jittered also where its 2-D ones are not.
-            spec.is_random() || (spec.sheet_1d && c.count == 1)
-        })
-    }
 }
 
 impl Sampler {
@@ -212,8 +180,7 @@ impl DecisionSampler {
         let decision = claim.decision as u64;
         let one_d = claim.count == 1;
         if one_d && spec.sheet_1d {
-            // The sheet's own 1-D sampler: strata, also where the 2-D set is another.
-            spec = SamplerSpec { points: Points::Stratified, order: Order::Step, random: Random::Jitter, ..spec };
+            spec = sheet_1d(spec);
         }
         let first = if spec.order == Order::Joint { claim.first } else { 0 };
         let axis = |axis: u32| {

@@ -2,8 +2,9 @@
 //! no difference. They stand beside their plain twins in the plan.
 
 use super::super::backend::{Backend, Estimator, SceneFacts, Size, Variant};
+use super::super::compared::read_sampler;
 use super::super::spec::{Estimators, Experiment};
-use super::{Making, PlannedSampler, Planner, Work, WorkItem, read_sampler};
+use super::{Making, PlannedSampler, Planner, Work, WorkItem};
 use crate::error::{Error, Result, did_you_mean};
 
 /// Whether `other`, which has the item's seed, is the item's twin.
@@ -31,7 +32,12 @@ pub(super) fn probed_samplers(
     let mut probed: Vec<String> = Vec::new();
     for (i, text) in stability.samplers.iter().enumerate() {
         let key = format!("stability.samplers[{i}]");
-        let canonical = read_sampler(text, &key, experiment, backend)?;
+        // A set goes by the name that the experiment gives it, anything else by what it means.
+        let named = samplers.iter().find(|sampler| sampler.names.contains(text));
+        let canonical = match named {
+            Some(sampler) => sampler.canonical.clone(),
+            None => read_sampler(text, &key, experiment, backend)?,
+        };
         if !samplers.iter().any(|sampler| sampler.canonical == canonical) {
             let names: Vec<&str> = samplers.iter().flat_map(|sampler| &sampler.names).map(String::as_str).collect();
             let near = did_you_mean(text, names.iter().copied());

@@ -7,6 +7,7 @@ use super::super::markdown::{Page, link_to};
 use super::super::numbers::{listed, signed_estimate};
 use super::super::summarise::{Cell, Summary};
 use super::correlation::patterns;
+use super::decisions;
 use super::identical::bytes;
 use super::points::star_against_uniform;
 use super::titles;
@@ -22,7 +23,8 @@ pub fn section(summary: &Summary, page: &mut Page) {
         page.paragraph("There are no comparisons yet to answer from.");
         return;
     };
-    let others = [identical(summary, scene), helps(summary, scene), hurts(summary)];
+    let which = decisions::answer(summary, &link_to(titles::WHICH));
+    let others = [which, identical(summary, scene), helps(summary, scene), hurts(summary)];
     let others: Vec<String> = others.into_iter().flatten().collect();
     let mut lines: Vec<String> = Points::ALL.iter().filter_map(|&points| technique(summary, points)).collect();
     lines.truncate(MOST_LINES - others.len());
@@ -223,7 +225,7 @@ fn hurts(summary: &Summary) -> Option<String> {
         .flat_map(|scene| patterns(summary, scene).into_iter().map(move |p| (scene, p)))
         // Decisions in step bias an image, which makes neighbours alike, too: the pattern alone is shown by the others.
         .filter(|(_, p)| p.errs_alike() == Answer::Yes && !p.cell.is_fixed)
-        .filter(|(_, p)| summary.samplers[p.sampler].spec.is_some_and(|spec| spec.order != Order::Step))
+        .filter(|(_, p)| summary.samplers[p.sampler].spec().is_some_and(|spec| spec.order != Order::Step))
         .filter_map(|(scene, p)| Some((scene, p.cell, p.cell.error_autocorrelation?)))
         .max_by(|a, b| a.2.value.total_cmp(&b.2.value));
     let mut parts = Vec::new();

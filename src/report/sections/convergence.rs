@@ -7,7 +7,7 @@ use super::super::markdown::Page;
 use super::super::numbers::{counted, estimate, listed, percent, short, signed_estimate};
 use super::super::summarise::{SLOPE_COUNTS, Slope, Summary};
 use super::super::write::Figures;
-use super::words::{estimate_cell, level, name, replicates, row, scene_name};
+use super::words::{estimate_cell, level, name, replicates, row, same_as_cell, scene_name};
 use super::{show, tabulate, tabulate_folded, titles};
 
 /// What independent samples have.
@@ -36,7 +36,9 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
     head.extend((0..summary.scenes.len()).map(|scene| scene_name(summary, scene)));
     let lines: Vec<Vec<String>> = (0..summary.samplers.len())
         .map(|sampler| {
-            let cells = (0..summary.scenes.len()).map(|scene| slope_cell(summary.slope(scene, sampler)));
+            let cells = (0..summary.scenes.len()).map(|scene| {
+                same_as_cell(summary, scene, sampler).unwrap_or_else(|| slope_cell(summary.slope(scene, sampler)))
+            });
             std::iter::once(name(summary, sampler)).chain(cells).collect()
         })
         .collect();
@@ -95,7 +97,7 @@ fn rmse_table(summary: &Summary) -> (Vec<Vec<String>>, Vec<String>) {
     let mut head = vec!["RMSE".to_owned(), "sampler".to_owned()];
     head.extend(spp.iter().map(|n| format!("{n} spp")));
     let lines = (0..summary.scenes.len())
-        .flat_map(|scene| (0..summary.samplers.len()).map(move |sampler| (scene, sampler)))
+        .flat_map(|scene| summary.compared(scene).map(move |sampler| (scene, sampler)))
         .map(|(scene, sampler)| {
             let cells = spp.iter().map(|&n| {
                 let cell = summary.cell(scene, sampler, n);

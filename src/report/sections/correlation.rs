@@ -40,7 +40,7 @@ pub fn between_decisions(summary: &Summary, page: &mut Page) {
 /// What two decisions of one pixel do to an integrand that needs both.
 fn pairing_table(summary: &Summary, page: &mut Page) {
     let measured: Vec<(usize, Vec<pairing::Paired>)> = (0..summary.samplers.len())
-        .filter_map(|i| Some((i, pairing::measure(&summary.samplers[i].spec?, summary.about.experiment.seed)?)))
+        .filter_map(|i| Some((i, pairing::measure(&summary.samplers[i].spec()?, summary.about.experiment.seed)?)))
         .collect();
     if measured.is_empty() {
         return;
@@ -199,7 +199,7 @@ fn cure_words(literal: &Cell, cured: &Cell, best_name: &str) -> String {
 fn shuffle_sentence(summary: &Summary, scene: usize, pairs: &[(usize, usize)]) -> Option<String> {
     let limit = |sampler: usize| summary.course(scene, sampler).map(|course| course.limit());
     let shuffled =
-        |&&(_, best): &&(usize, usize)| summary.samplers[best].spec.is_some_and(|s| s.order == Order::Shuffle);
+        |&&(_, best): &&(usize, usize)| summary.samplers[best].spec().is_some_and(|s| s.order == Order::Shuffle);
     let cured = |wanted: Limit| -> Vec<String> {
         let is_cured = |&&(sheet, best): &&(usize, usize)| {
             let unbiased = summary.course(scene, best).is_some_and(|course| course.is_biased() == Answer::No);
@@ -243,7 +243,7 @@ fn control_sentence(summary: &Summary, scene: usize, uniform: usize) -> Option<S
 
 /// The sampler that differs from this one in being new in every pixel, else the same family's `:best`.
 fn twin(summary: &Summary, sampler: usize) -> Option<usize> {
-    let spec = summary.samplers[sampler].spec?;
+    let spec = summary.samplers[sampler].spec()?;
     let each = SamplerSpec { scope: Scope::Each, ..spec }.to_string();
     let same = summary.samplers.iter().position(|s| s.canonical == each).filter(|&i| i != sampler);
     same.or_else(|| summary.preset(spec.points, crate::sampling::Preset::Best)).filter(|&i| i != sampler)
@@ -330,8 +330,9 @@ fn neighbours_table(summary: &Summary, spp: u32, page: &mut Page) {
         .flat_map(|scene| (0..summary.samplers.len()).map(move |sampler| (scene, sampler)))
         .filter_map(|(scene, sampler)| {
             let cell = summary.cell(scene, sampler, spp)?;
-            let pattern = match (repeats.contains(&sampler), summary.samplers[sampler].spec.map(|spec| spec.random)) {
+            let pattern = match (repeats.contains(&sampler), summary.samplers[sampler].spec().map(|spec| spec.random)) {
                 (true, Some(Random::Yxor)) => "x the same in every pixel",
+                (true, None) => "in some decision the same in every pixel",
                 (true, _) => "the same in every pixel",
                 _ => "new in each pixel",
             };
@@ -365,7 +366,7 @@ fn pattern_sentence(summary: &Summary, scene: usize, p: &Pattern) -> String {
         };
         format!(", {words} (ratio {})", times(&ratio))
     });
-    let step = summary.samplers[p.sampler].spec.is_some_and(|spec| spec.order == Order::Step);
+    let step = summary.samplers[p.sampler].spec().is_some_and(|spec| spec.order == Order::Step);
     let step = if step { " Its decisions are in step, too." } else { "" };
     let mut text =
         format!("{verdict}: ρ = {}, {other} {}{error}.{step} {}", rho(p.cell), rho(p.other), rows(&[p.cell, p.other]));

@@ -9,7 +9,7 @@ use super::super::summarise::{Cell, Summary};
 use super::correlation::{pattern_spp, patterns};
 use super::speed::efficiency;
 use super::titles;
-use super::words::{bias_words, limit_words, name, ratio_cell, rmse_ratio, row, rows, scene_name, times};
+use super::words::{bias_words, limit_words, name, ratio_cell, rmse_ratio, row, rows, same_as_cell, scene_name, times};
 
 /// An error at a count that is no power of two, over what its neighbours promise.
 pub struct OddCount {
@@ -114,7 +114,7 @@ fn stability(summary: &Summary, page: &mut Page) {
     let lines: Vec<Vec<String>> = (0..summary.samplers.len())
         .map(|sampler| {
             let cells = (0..summary.scenes.len()).map(|scene| match summary.cell(scene, sampler, spp) {
-                None => "missing".to_owned(),
+                None => same_as_cell(summary, scene, sampler).unwrap_or("missing".to_owned()),
                 Some(cell) if cell.is_fixed => "nothing random".to_owned(),
                 Some(cell) => spread(cell).map_or("–".to_owned(), |s| format!("{s:.2}")),
             });
@@ -137,7 +137,8 @@ pub fn table(summary: &Summary, page: &mut Page) {
         head.extend(scenes.iter().cloned());
         let lines: Vec<Vec<String>> = (0..summary.samplers.len())
             .map(|sampler| {
-                let cells = (0..summary.scenes.len()).map(|scene| cell(scene, sampler));
+                let cells = (0..summary.scenes.len())
+                    .map(|scene| same_as_cell(summary, scene, sampler).unwrap_or_else(|| cell(scene, sampler)));
                 std::iter::once(name(summary, sampler)).chain(cells).collect()
             })
             .collect();
@@ -183,7 +184,8 @@ fn others(summary: &Summary, page: &mut Page) {
     let at = scene_name(summary, scene);
     let odd_asked = (0..summary.samplers.len()).find_map(|i| odd_count(summary, scene, i)).map(|odd| odd.asked);
     let pattern = pattern_spp(summary);
-    let lines: Vec<Vec<String>> = (0..summary.samplers.len())
+    let lines: Vec<Vec<String>> = summary
+        .compared(scene)
         .map(|sampler| {
             let odd = odd_count(summary, scene, sampler);
             let works = odd.as_ref().map_or("–".to_owned(), |odd| {
@@ -194,8 +196,9 @@ fn others(summary: &Summary, page: &mut Page) {
                 };
                 format!("{word}: {} ({} taken)", times(&odd.ratio), odd.taken)
             });
-            let spec = summary.samplers[sampler].spec;
-            let random = spec.map_or("unknown", |spec| if spec.is_random() { "yes" } else { "no" });
+            let decisions = &summary.scenes[scene].decisions;
+            let random = summary.samplers[sampler].set.map(|set| set.is_random_for(decisions));
+            let random = random.map_or("unknown", |is_random| if is_random { "yes" } else { "no" });
             let rho =
                 pattern.and_then(|spp| summary.cell(scene, sampler, spp)).and_then(|cell| cell.error_autocorrelation);
             vec![

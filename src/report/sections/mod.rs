@@ -17,6 +17,7 @@
 mod answers;
 mod convergence;
 mod correlation;
+mod decisions;
 mod failures;
 mod identical;
 mod opening;
@@ -36,6 +37,7 @@ mod titles {
     pub const WITHIN: &str = "Within a set";
     pub const DECISIONS: &str = "Between decisions";
     pub const PIXELS: &str = "Between pixels";
+    pub const WHICH: &str = "Which decision matters";
     pub const IDENTICAL: &str = "Identical";
     pub const CONVERGENCE: &str = "Convergence";
     pub const BIAS: &str = "Bias and variance";
@@ -63,6 +65,7 @@ pub fn report(summary: &Summary, figures: &Figures) -> String {
     points::within(summary, &mut page);
     correlation::between_decisions(summary, &mut page);
     correlation::between_pixels(summary, &mut page);
+    decisions::section(summary, figures, &mut page);
     identical::section(summary, &mut page);
     convergence::section(summary, figures, &mut page);
     convergence::bias_and_variance(summary, figures, &mut page);

@@ -1,6 +1,7 @@
 //! What was run, how to read it, scenes and samplers.
 
 use crate::experiment::spec::Estimators;
+use crate::sampling::Decision;
 
 use super::super::markdown::{Page, link_to};
 use super::super::numbers::{counted, listed, short};
@@ -161,7 +162,7 @@ fn sampler_row(summary: &Summary, i: usize) -> Vec<String> {
             format!("{} ({})", name(summary, i), listed(&names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>()))
         }
     };
-    let Some(spec) = &sampler.spec else {
+    let Some(set) = &sampler.set else {
         return vec![
             names,
             format!("`{}`", sampler.canonical),
@@ -170,6 +171,20 @@ fn sampler_row(summary: &Summary, i: usize) -> Vec<String> {
             "unknown".into(),
         ];
     };
-    let random = if spec.is_random() { "yes" } else { "no" };
-    vec![names, spec.expansion(), spec.describe(), random.to_owned(), spec.taken(26).to_string()]
+    let is_random = Decision::ALL.iter().any(|&decision| set.of(decision).is_random());
+    let random = if is_random { "yes" } else { "no" };
+    let taken = Decision::ALL.iter().filter(|d| d.dimensions() == 2).map(|&d| set.of(d).taken(26)).max().unwrap_or(26);
+    let (most, odd) = set.majority();
+    let exceptions: Vec<String> = odd.iter().map(|&d| format!("{}: {}", d.name(), set.of(d).expansion())).collect();
+    let (meaning, describe) = match set.single() {
+        Some(spec) => (spec.expansion(), spec.describe()),
+        None => (
+            format!("{}; {}", most.expansion(), exceptions.join("; ")),
+            format!(
+                "A sampler for each decision: all read the first but {}.",
+                listed(&odd.iter().map(|d| format!("the {}", d.name())).collect::<Vec<_>>())
+            ),
+        ),
+    };
+    vec![names, meaning, describe, random.to_owned(), taken.to_string()]
 }

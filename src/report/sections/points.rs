@@ -97,7 +97,8 @@ pub fn discrepancy(summary: &Summary, figures: &Figures, page: &mut Page) {
         "Star discrepancy D* (no unit) of one decision's points at some numbers of points n, mean of {} with 95 % intervals in brackets, and its slope in n.",
         sets_measured(summary)
     );
-    tabulate(page, "discrepancy", &caption, &head, &(0..summary.samplers.len()).map(line).collect::<Vec<_>>());
+    let with_sets = (0..summary.samplers.len()).filter(|&i| !summary.samplers[i].is_mixed());
+    tabulate(page, "discrepancy", &caption, &head, &with_sets.map(line).collect::<Vec<_>>());
     page.paragraph(&format!(
         "The slope is that of the root mean square over sets, powers of two from {SLOPE_POINTS}; independent points have −0.5."
     ));

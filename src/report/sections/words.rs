@@ -95,6 +95,11 @@ pub fn against_one(ratio: &Estimate) -> &'static str {
     }
 }
 
+/// In place of a number: the sampler that means the same in this scene, where one does.
+pub fn same_as_cell(summary: &Summary, scene: usize, sampler: usize) -> Option<String> {
+    summary.same_as(scene, sampler).map(|same| format!("as {}", name(summary, same)))
+}
+
 /// A ratio in a table.
 pub fn ratio_cell(ratio: Option<Estimate>) -> String {
     ratio.map_or_else(|| "–".to_owned(), |ratio| times(&ratio))

@@ -3,7 +3,7 @@
 use crate::experiment::results::{Estimator, Variant};
 use crate::experiment::spec::Estimators;
 
-use super::{Cell, Index, Summary, samplers_of};
+use super::{Cell, Index, Summary};
 
 /// One sampler in one scene whose stability is asked about.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,17 +24,15 @@ impl Index<'_> {
     /// What the stability of each sampler is told by; subjects of which anything is missing are missing.
     pub(super) fn add_stability(&self, summary: &mut Summary) {
         let Some(stability) = summary.about.experiment.stability.clone() else { return };
-        let probed: Vec<String> =
-            samplers_of(&stability.samplers).into_iter().map(|sampler| sampler.canonical).collect();
         let (mut missing, mut expected) = (0, 0);
         for scene in 0..summary.scenes.len() {
             let name = summary.about.experiment.scenes.get(scene);
             if !name.is_some_and(|name| stability.scenes.contains(name)) {
                 continue;
             }
-            for sampler in 0..summary.samplers.len() {
+            for sampler in summary.compared(scene).collect::<Vec<_>>() {
                 let (s, p) = (&summary.scenes[scene], &summary.samplers[sampler]);
-                if !probed.contains(&p.canonical) {
+                if !stability.samplers.iter().any(|text| p.is_meant_by(text)) {
                     continue;
                 }
                 let cell = |asked: u32, variant: Variant| {
