@@ -8,6 +8,8 @@ use std::path::Path;
 /// What went wrong, as the exit code tells it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ErrorKind {
+    /// A gate or test failed, and all went well otherwise: exit code 1.
+    Failed,
     /// Bad input or usage: exit code 2.
     Input,
     /// An output could not be written: exit code 3.
@@ -31,6 +33,11 @@ pub struct Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
+    /// A gate or test at `place` that failed.
+    pub fn failed(place: impl fmt::Display, what: impl fmt::Display) -> Self {
+        Self { kind: ErrorKind::Failed, place: place.to_string(), what: what.to_string() }
+    }
+
     /// Bad input at `place`.
     pub fn input(place: impl fmt::Display, what: impl fmt::Display) -> Self {
         Self { kind: ErrorKind::Input, place: place.to_string(), what: what.to_string() }
@@ -46,9 +53,10 @@ impl Error {
         Self { kind: ErrorKind::Incomplete, place: place.to_string(), what: what.to_string() }
     }
 
-    /// The process exit code of this kind of error: 2, 3 or 4.
+    /// The process exit code of this kind of error: 1 to 4.
     pub fn exit_code(&self) -> u8 {
         match self.kind {
+            ErrorKind::Failed => 1,
             ErrorKind::Input => 2,
             ErrorKind::Write => 3,
             ErrorKind::Incomplete => 4,

@@ -96,14 +96,14 @@ pub fn ensemble(replicates: &[Arc<Image>], reference: &ReferenceImages) -> (Ense
     // A mean over some replicates only would be another quantity: one that is not defined leaves none.
     let correlations: Option<Vec<f64>> = replicates.iter().map(|image| autocorrelation(image, reference)).collect();
     let rounded = Ensemble {
-        mse: round_interval(e.mse),
-        rmse: e.rmse.map(round_interval),
-        rel_mse: round_interval(e.rel_mse),
-        bias2: round_interval(e.bias2),
-        variance: e.variance.map(round_interval),
-        bias: round_interval(e.bias),
+        mse: e.mse.with_rounded_interval(),
+        rmse: e.rmse.map(Estimate::with_rounded_interval),
+        rel_mse: e.rel_mse.with_rounded_interval(),
+        bias2: e.bias2.with_rounded_interval(),
+        variance: e.variance.map(Estimate::with_rounded_interval),
+        bias: e.bias.with_rounded_interval(),
     };
-    (rounded, correlations.map(|values| round_interval(t_interval(&values, 0.95))))
+    (rounded, correlations.map(|values| t_interval(&values, 0.95).with_rounded_interval()))
 }
 
 /// Correlation of the error between neighbouring pixels.
@@ -124,28 +124,9 @@ pub fn check_finite(image: &Image, place: &str) -> Result<()> {
     Err(Error::incomplete(place, format!("expected finite radiance, found {found:?} in pixel ({x}, {y})")))
 }
 
-/// An estimate whose interval is rounded to 6 significant digits: quantiles and resampling deserve no more.
-fn round_interval(estimate: Estimate) -> Estimate {
-    Estimate { ci95: estimate.ci95.map(|ends| ends.map(round_6)), ..estimate }
-}
-
-/// The number nearest to `x` among those of 6 significant decimal digits.
-fn round_6(x: f64) -> f64 {
-    // Decimal text is exact in both directions, so no platform differs; a number's own text always reads.
-    format!("{x:.5e}").parse().unwrap_or(x)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn intervals_keep_six_digits() {
-        assert_eq!(round_6(0.123_456_789), 0.123_457);
-        assert_eq!(round_6(-1_234_567.0), -1_234_570.0);
-        assert_eq!(round_6(9.999_999e-12), 1e-11);
-        assert_eq!(round_6(0.0), 0.0);
-    }
 
     #[test]
     fn a_closed_form_has_no_noise_and_both_mean_squares_agree() {

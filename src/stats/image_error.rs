@@ -146,14 +146,14 @@ pub struct Ensemble {
 ///
 /// One replicate: the interval holds reference noise alone, which is the whole truth only for an estimator
 /// without randomness; with an exact reference there is no interval.
-pub fn ensemble(replicates: &[&[[f32; 3]]], r1: &[[f32; 3]], r2: &[[f32; 3]]) -> Ensemble {
+pub fn ensemble<P: Copy + Into<f64>>(replicates: &[&[[P; 3]]], r1: &[[P; 3]], r2: &[[P; 3]]) -> Ensemble {
     assert!(!replicates.is_empty(), "an ensemble needs a replicate");
     assert!(replicates.iter().all(|t| t.len() == r1.len()) && r1.len() == r2.len(), "images differ in size");
     let mean_image = mean_image(replicates);
     let noise = ReferenceNoise::of(&mean_image, r1, r2);
     let (r1, r2) = (r1.as_flattened(), r2.as_flattened());
 
-    let over_replicates = |f: &dyn Fn(&[f32]) -> f64, reference: Uncertainty| {
+    let over_replicates = |f: &dyn Fn(&[P]) -> f64, reference: Uncertainty| {
         let values: Moments = replicates.iter().map(|t| f(t.as_flattened())).collect();
         let spread = values.standard_error().map(|e| Uncertainty { variance: e * e, freedom: values.n() as f64 - 1.0 });
         estimate(values.mean().unwrap_or(f64::NAN), spread, reference)
@@ -171,9 +171,9 @@ pub fn ensemble(replicates: &[&[[f32; 3]]], r1: &[[f32; 3]], r2: &[[f32; 3]]) ->
 }
 
 /// mean (T − R1)(T − R2)/(R̄² + ε): the numerator is unbiased, the denominator keeps the noise of R̄.
-fn rel_mse_unbiased(t: &[f32], r1: &[f32], r2: &[f32]) -> f64 {
+fn rel_mse_unbiased<P: Copy + Into<f64>>(t: &[P], r1: &[P], r2: &[P]) -> f64 {
     let terms = t.iter().zip(r1).zip(r2).map(|((&t, &r1), &r2)| {
-        let (t, r1, r2) = (f64::from(t), f64::from(r1), f64::from(r2));
+        let (t, r1, r2): (f64, f64, f64) = (t.into(), r1.into(), r2.into());
         (t - r1) * (t - r2) * relative_weight(r1, r2)
     });
     sum(terms) / t.len() as f64
@@ -186,8 +186,8 @@ fn relative_weight(r1: f64, r2: f64) -> f64 {
 }
 
 /// Pixel-channel means over the replicates.
-fn mean_image(replicates: &[&[[f32; 3]]]) -> Vec<[f64; 3]> {
-    let mean = |p: usize, c: usize| sum(replicates.iter().map(|t| f64::from(t[p][c]))) / replicates.len() as f64;
+fn mean_image<P: Copy + Into<f64>>(replicates: &[&[[P; 3]]]) -> Vec<[f64; 3]> {
+    let mean = |p: usize, c: usize| sum(replicates.iter().map(|t| t[p][c].into())) / replicates.len() as f64;
     (0..replicates[0].len()).map(|p| std::array::from_fn(|c| mean(p, c))).collect()
 }
 
@@ -235,12 +235,11 @@ struct ReferenceNoise {
 }
 
 impl ReferenceNoise {
-    fn of(mean: &[[f64; 3]], r1: &[[f32; 3]], r2: &[[f32; 3]]) -> Self {
+    fn of<P: Copy + Into<f64>>(mean: &[[f64; 3]], r1: &[[P; 3]], r2: &[[P; 3]]) -> Self {
         let n = 3.0 * mean.len() as f64;
         let over_channels = |f: fn(f64, f64, f64) -> f64| {
-            let pixel = move |p: usize| -> f64 {
-                (0..3).map(|c| f(mean[p][c], f64::from(r1[p][c]), f64::from(r2[p][c]))).sum()
-            };
+            let pixel =
+                move |p: usize| -> f64 { (0..3).map(|c| f(mean[p][c], r1[p][c].into(), r2[p][c].into())).sum() };
             Uncertainty::of_independent((0..mean.len()).map(pixel), n)
         };
         Self {
@@ -256,20 +255,20 @@ impl ReferenceNoise {
 ///
 /// Leaving replicate i out moves the mean image by −d_i/(R − 1), d_i = T_i − T̄, so two means a replicate suffice:
 /// q_i = mean d_i² and p_i = mean d_i (e1 + e2) with e1 = T̄ − R1, e2 = T̄ − R2.
-fn bias2_and_variance(
-    replicates: &[&[[f32; 3]]],
+fn bias2_and_variance<P: Copy + Into<f64>>(
+    replicates: &[&[[P; 3]]],
     mean: &[[f64; 3]],
-    r1: &[f32],
-    r2: &[f32],
+    r1: &[P],
+    r2: &[P],
     reference: Uncertainty,
 ) -> (Estimate, Option<Estimate>) {
     let mean = mean.as_flattened();
     let (n, count) = (mean.len() as f64, replicates.len() as f64);
-    let error1 = |i: usize| mean[i] - f64::from(r1[i]);
-    let error2 = |i: usize| mean[i] - f64::from(r2[i]);
+    let error1 = |i: usize| mean[i] - r1[i].into();
+    let error2 = |i: usize| mean[i] - r2[i].into();
     let products = sum((0..mean.len()).map(|i| error1(i) * error2(i))) / n;
-    let means_of = |t: &&[[f32; 3]]| {
-        let deviation = |i: usize| f64::from(t.as_flattened()[i]) - mean[i];
+    let means_of = |t: &&[[P; 3]]| {
+        let deviation = |i: usize| t.as_flattened()[i].into() - mean[i];
         let q = sum((0..mean.len()).map(|i| deviation(i) * deviation(i))) / n;
         (q, sum((0..mean.len()).map(|i| deviation(i) * (error1(i) + error2(i)))) / n)
     };

@@ -6,7 +6,7 @@
 //! | question | module |
 //! |---|---|
 //! | mean, variance, intervals | [`moments`] |
-//! | how far is an image from its reference | [`image_error`] |
+//! | how far is an image from its reference | [`image_error`], [`trimmed`] |
 //! | how fast does the error fall | [`fit`] |
 //! | does an estimator agree with the truth | [`hypothesis`] |
 //! | how even is a point set | [`discrepancy`] |
@@ -17,6 +17,7 @@ pub mod hypothesis;
 pub mod image_error;
 pub mod moments;
 mod special;
+pub mod trimmed;
 
 pub use discrepancy::{L2Kind, Points, PointsError, Side, Star};
 pub use fit::{IntervalKind, LineFit, SlopeFit, loglog_slope, slope_with_interval};

@@ -21,11 +21,23 @@ impl Estimate {
         Self { value, ci95: None }
     }
 
+    /// The same with the interval's ends rounded to 6 significant digits, as intervals are written: quantiles and
+    /// resampling deserve no more, and every machine writes the same digits. The value keeps all of its own.
+    pub fn with_rounded_interval(self) -> Self {
+        Self { ci95: self.ci95.map(|ends| ends.map(round_6)), ..self }
+    }
+
     /// `value` ± `half_width`; no interval where the half-width is absent or not finite.
     pub(super) fn symmetric(value: f64, half_width: Option<f64>) -> Self {
         let ci95 = half_width.filter(|h| h.is_finite()).map(|h| [value - h, value + h]);
         Self { value, ci95 }
     }
+}
+
+/// The number nearest to `x` among those of 6 significant decimal digits.
+fn round_6(x: f64) -> f64 {
+    // Decimal text is exact in both directions, so no platform differs; a number's own text always reads.
+    format!("{x:.5e}").parse().unwrap_or(x)
 }
 
 /// Running mean and variance (Welford 1962), merged by Chan, Golub & LeVeque (1979).
@@ -167,6 +179,14 @@ pub(super) fn jackknife_variance(n: usize, theta: impl Fn(Option<usize>) -> f64)
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn intervals_keep_six_digits() {
+        assert_eq!(round_6(0.123_456_789), 0.123_457);
+        assert_eq!(round_6(-1_234_567.0), -1_234_570.0);
+        assert_eq!(round_6(9.999_999e-12), 1e-11);
+        assert_eq!(round_6(0.0), 0.0);
+    }
 
     #[test]
     fn a_large_offset_does_not_touch_the_variance() {
