@@ -1,4 +1,10 @@
-//! Linear radiance images: EXR with provenance, PNG with exposure, and outputs that are whole or absent.
+//! Linear radiance images: EXR with provenance, PNG with exposure, outputs that are whole or absent; and images of other
+//! programs ([`read_picture`]).
+
+mod exr_in;
+mod pfm;
+mod picture;
+mod png_in;
 
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
@@ -6,6 +12,9 @@ use std::path::{Path, PathBuf};
 use exr::prelude::*;
 
 use crate::error::{Error, Result};
+
+pub use pfm::write_pfm;
+pub use picture::{MAX_PIXELS, PICTURE_PIXEL_BYTES, Picture, read_picture};
 
 /// Linear radiance, `f32` RGB, top row first: `pixels[y * width + x]`.
 #[derive(Debug, Clone, PartialEq)]

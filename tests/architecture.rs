@@ -23,6 +23,7 @@ const FLOORS: &[Floor] = &[
     // The sRGB curve of textures is film's.
     Floor { module: "scene", may_use: &["sampling", "accel", "error", "film"] },
     Floor { module: "render", may_use: &["scene", "sampling", "accel", "film", "error"] },
+    Floor { module: "compare", may_use: &["stats", "film", "error"] },
     Floor { module: "points", may_use: &["sampling", "stats", "film", "error"] },
     Floor {
         module: "experiment",

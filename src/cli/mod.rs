@@ -1,5 +1,6 @@
 //! Arguments, and what goes where: results to stdout or files, all else to stderr.
 
+mod compare;
 mod experiment;
 mod image;
 mod sets;
@@ -38,6 +39,8 @@ enum Command {
     Points(sets::DrawPoints),
     /// Measure a point set: discrepancies, t-value, distances
     Measure(sets::Measure),
+    /// Compare images of any renderer with a reference: errors, intervals, gates
+    Compare(compare::Compare),
     /// Show or check a scene file
     Config(Config),
     /// Say what a sampler does, and which numbers its decisions read for a scene
@@ -53,6 +56,7 @@ impl Cli {
             Command::Render(args) => args.run(),
             Command::Points(args) => args.run(),
             Command::Measure(args) => args.run(),
+            Command::Compare(args) => args.run(),
             Command::Config(args) => args.run(),
             Command::Explain(args) => args.run(),
         }
