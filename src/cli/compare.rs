@@ -100,11 +100,10 @@ impl Compare {
         }
         let real = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         let images: Vec<PathBuf> = self.images.iter().map(|path| real(path)).collect();
-        if self.replicates {
-            if let Some(i) = (1..images.len()).find(|&i| images[..i].contains(&images[i])) {
-                let what = format!("expected independent images, found {} twice", self.images[i].display());
-                return Err(Error::input("--replicates", what));
-            }
+        let repeated = (1..images.len()).find(|&i| images[..i].contains(&images[i]));
+        if let Some(i) = repeated.filter(|_| self.replicates) {
+            let what = format!("expected independent images, found {} twice", self.images[i].display());
+            return Err(Error::input("--replicates", what));
         }
         if let Some(diff) = &self.diff {
             if !self.replicates && self.images.len() > 1 {
