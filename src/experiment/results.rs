@@ -11,9 +11,12 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 pub use super::backend::{Estimator, PointMetrics, SceneFacts, Size, Stage, Variant};
 use super::backend::{estimator_word, stage_word};
 
+use super::backend::Algorithms;
+use super::identity::{ID_LENGTH, pixel_hash};
+use super::lines::{line, lines};
 use super::spec::Experiment;
 use crate::error::{Error, Result};
-use crate::film::write_whole;
+use crate::film::{Image, read_exr};
 use crate::stats::Estimate;
 
 /// Version of the row format, field `schema`.
@@ -37,6 +40,54 @@ pub fn about_path(out: &Path) -> PathBuf {
 /// Where the image of an item is.
 pub fn image_path(out: &Path, id: &str) -> PathBuf {
     out.join("images").join(format!("{id}.exr"))
+}
+
+/// The image of an item, which proves to be the one that was written: right id, and the digest of its pixels is the one
+/// written with it and, where `pixels` is known from a row, that one.
+///
+/// # Errors
+/// Kind `Input` where the file is missing, torn, or not what was written.
+pub fn read_image(out: &Path, id: &str, pixels: Option<&str>) -> Result<Image> {
+    let path = image_path(out, id);
+    let (image, provenance) = read_exr(&path)?;
+    let says = |name: &str| provenance.iter().find(|(n, _)| n == name).map_or("", |(_, value)| value.as_str());
+    let found = pixel_hash(&image.pixels);
+    for (what, expected, found) in [
+        ("the id", id, says("id")),
+        ("pixels with the digest", says("pixels"), &found),
+        ("pixels with the digest", pixels.unwrap_or(&found), &found),
+    ] {
+        if expected != found {
+            return Err(Error::input(path.display(), format!("expected {what} {expected}, found {found}")));
+        }
+    }
+    Ok(image)
+}
+
+/// What a row was made with, besides what it says of itself: together with that it is what the item's id hashes. A row
+/// that no longer fits says with it what has changed.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MadeWith {
+    /// Start of the digest of the scene's content; none for a point set.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene: Option<String>,
+    /// Algorithm number of the renderer.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub renderer: Option<u32>,
+    /// Algorithm number of the sampler.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sampler: Option<u32>,
+    /// Algorithm number of the light estimator.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub estimator: Option<u32>,
+    /// Algorithm number of the closed forms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exact: Option<u32>,
+}
+
+/// As many digits of a content hash as rows and messages show.
+pub fn short_hash(content_hash: &str) -> String {
+    content_hash.chars().take(ID_LENGTH).collect()
 }
 
 /// The sort of an item.
@@ -161,6 +212,9 @@ pub struct ImageRow {
     /// What differs from the image that this one is another making of; absent where there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub twin: Option<TwinDifference>,
+    /// What it was made with; rows of earlier versions do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_with: Option<MadeWith>,
     /// Errors against the reference.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub errors: Option<ImageErrors>,
@@ -195,6 +249,9 @@ pub struct ReferenceRow {
     pub mean: f64,
     /// Digest of the pixels of the mean of the halves; for a closed form those of its image.
     pub pixels: String,
+    /// What it was made with; rows of earlier versions do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_with: Option<MadeWith>,
 }
 
 /// Kind `ensemble`: what the replicates of one sampler at one spp say together.
@@ -244,6 +301,9 @@ pub struct EnsembleRow {
     pub error_autocorrelation: Option<Estimate>,
     /// Ids of the replicates.
     pub members: Vec<String>,
+    /// What it was made with; rows of earlier versions do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_with: Option<MadeWith>,
 }
 
 /// Kind `points`.
@@ -270,6 +330,9 @@ pub struct PointsRow {
     pub metrics_algorithm: u32,
     /// Values by name; null where a metric is not defined for the set.
     pub metrics: PointMetrics,
+    /// What it was made with; rows of earlier versions do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_with: Option<MadeWith>,
 }
 
 /// One line of `results.jsonl`.
@@ -351,6 +414,37 @@ impl Row {
         }
     }
 
+    /// What the row was made with, where it says so.
+    pub fn made_with(&self) -> Option<&MadeWith> {
+        match self {
+            Self::Image(row) => row.made_with.as_ref(),
+            Self::Reference(row) => row.made_with.as_ref(),
+            Self::Ensemble(row) => row.made_with.as_ref(),
+            Self::Points(row) => row.made_with.as_ref(),
+        }
+    }
+
+    /// The scene's name; none for a point set.
+    pub fn scene(&self) -> Option<&str> {
+        match self {
+            Self::Image(row) => Some(&row.scene),
+            Self::Reference(row) => Some(&row.scene),
+            Self::Ensemble(row) => Some(&row.scene),
+            Self::Points(_) => None,
+        }
+    }
+
+    /// Writes down what the row was made with: its id vouches for it, and a row of an earlier version did not say.
+    pub(super) fn set_made_with(&mut self, made_with: &MadeWith) {
+        let field = match self {
+            Self::Image(row) => &mut row.made_with,
+            Self::Reference(row) => &mut row.made_with,
+            Self::Ensemble(row) => &mut row.made_with,
+            Self::Points(row) => &mut row.made_with,
+        };
+        *field = Some(made_with.clone());
+    }
+
     /// Writes down what the experiment calls the sampler now: an alias may have come or gone since the row was made.
     pub(super) fn set_names(&mut self, now: &[String]) {
         match self {
@@ -397,6 +491,31 @@ pub struct About {
     /// Sets of samplers that are not done in a scene, because another one means the same there.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<LeftOut>,
+    /// Where the experiment and its scenes were read from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<Source>,
+    /// The algorithm numbers of the program that wrote this.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub algorithms: Option<Algorithms>,
+}
+
+impl About {
+    /// Whether a row is about a scene as it is described here; one that does not say is.
+    pub fn fits(&self, row: &Row) -> bool {
+        let made_of = row.made_with().and_then(|made| made.scene.as_deref());
+        let (Some(name), Some(made_of)) = (row.scene(), made_of) else { return true };
+        self.scenes.iter().any(|scene| scene.name == name && short_hash(&scene.content_hash) == made_of)
+    }
+}
+
+/// What to read again to plan the same experiment: as given on the command line, so relative to where that was given.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Source {
+    /// The experiment file.
+    pub file: String,
+    /// Keys changed in the scene files.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sets: Vec<String>,
 }
 
 /// A set of samplers that means in one scene, for the decisions that the scene makes, the same as another one.
@@ -440,54 +559,6 @@ pub(super) fn parse_timing(line: &str) -> std::result::Result<Timing, String> {
     serde_json::from_str(line).map_err(|e| format!("expected a timing, found: {e}"))
 }
 
-/// Reads a file of one JSON value a line; the flag says whether the file is exactly its whole lines.
-///
-/// A last line without an end that does not read was torn and is dropped; one that reads is whole but for its end.
-pub(super) fn lines<T>(path: &Path, parse: impl Fn(&str) -> std::result::Result<T, String>) -> Result<(Vec<T>, bool)> {
-    let bytes = std::fs::read(path)
-        .map_err(|e| Error::input(path.display(), format!("expected a file of results, found: {e}")))?;
-    let mut values = Vec::new();
-    for (number, bytes) in bytes.split_inclusive(|&byte| byte == b'\n').enumerate() {
-        let whole = bytes.ends_with(b"\n");
-        let value = std::str::from_utf8(bytes).map_err(|e| e.to_string()).and_then(|text| parse(text.trim_end()));
-        match value {
-            Ok(value) => values.push(value),
-            Err(_) if !whole => {}
-            Err(what) => return Err(Error::input(format!("{}:{}", path.display(), number + 1), what)),
-        }
-    }
-    Ok((values, bytes.is_empty() || bytes.ends_with(b"\n")))
-}
-
-/// As [`lines`], where a missing file is an empty one.
-pub(super) fn lines_if_any<T>(
-    path: &Path,
-    parse: impl Fn(&str) -> std::result::Result<T, String>,
-) -> Result<(Vec<T>, bool)> {
-    if path.exists() { lines(path, parse) } else { Ok((Vec::new(), true)) }
-}
-
-/// Writes a file of one JSON value a line, whole or not at all; not touched where it would not change.
-pub(super) fn write_lines<'a, T: Serialize + 'a>(path: &Path, values: impl Iterator<Item = &'a T>) -> Result<()> {
-    let mut text = String::new();
-    for value in values {
-        text.push_str(&line(value));
-        text.push('\n');
-    }
-    write_if_changed(path, text.as_bytes())
-}
-
-/// Writes `bytes` whole or not at all; a file that has them already keeps its time of change.
-pub(super) fn write_if_changed(path: &Path, bytes: &[u8]) -> Result<()> {
-    if std::fs::read(path).is_ok_and(|old| old == bytes) { Ok(()) } else { write_whole(path, bytes) }
-}
-
-/// One value as one line of JSON.
-pub(super) fn line(value: &impl Serialize) -> String {
-    // Rows are plain structs with text keys: nothing in them can fail to serialise.
-    serde_json::to_string(value).expect("a row serialises")
-}
-
 /// Seeds as decimal texts.
 fn decimal<S: Serializer>(seed: &u64, serializer: S) -> std::result::Result<S::Ok, S::Error> {
     serializer.collect_str(seed)
@@ -521,6 +592,7 @@ mod tests {
             mean: 0.25,
             pixels: "ffff".to_owned(),
             twin: None,
+            made_with: None,
             errors: Some(ImageErrors {
                 reference_id: "fedcba9876543210".to_owned(),
                 metrics_algorithm: 1,

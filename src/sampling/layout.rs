@@ -123,6 +123,19 @@ impl SampleLayout {
         claim
     }
 
+    /// The layout that prints as `text`; `None` where none does.
+    pub fn parse(text: &str) -> Option<Self> {
+        let mut layout = Self::default();
+        for decision in Decision::ALL {
+            let names =
+                |part: &str| part.trim_start().strip_prefix(decision.name()).is_some_and(|rest| rest.starts_with(' '));
+            if text.split(',').any(names) {
+                layout.claim(decision, if decision == Decision::LightPick { 1 } else { 2 });
+            }
+        }
+        (layout.to_string() == text).then_some(layout)
+    }
+
     /// All claims in order.
     pub fn claims(&self) -> &[Claim] {
         &self.claims
