@@ -5,9 +5,12 @@
 //! | read a file | [`spec`] | strict, pure data |
 //! | list the work | [`plan`] | pure: ids and seeds come from content |
 //! | say what is left and what it costs | [`survey`] | reads the output folder |
-//! | do it | [`execute`] | the only slow stage; can be stopped at any moment |
+//! | do it | [`execute`] | the only slow stage; can be stopped at any moment, or cut into [`shards`] |
 //! | rows | [`results`] | typed lines of `results.jsonl` |
+//! | join shards | [`merge`] | renders nothing, opens no scene |
+//! | say what is done, missing or stale | [`status`], [`why`] | reads the output folder |
 
+mod about;
 pub mod backend;
 mod compared;
 mod entry;

@@ -8,13 +8,12 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+pub use super::about::{About, LeftOut, Source, about_path, read_about};
 pub use super::backend::{Estimator, PointMetrics, SceneFacts, Size, Stage, Variant};
 use super::backend::{estimator_word, stage_word};
 
-use super::backend::Algorithms;
 use super::identity::{ID_LENGTH, pixel_hash};
 use super::lines::{line, lines};
-use super::spec::Experiment;
 use crate::error::{Error, Result};
 use crate::film::{Image, read_exr};
 use crate::stats::Estimate;
@@ -30,11 +29,6 @@ pub fn results_path(out: &Path) -> PathBuf {
 /// Where the timings of an output folder are.
 pub fn timings_path(out: &Path) -> PathBuf {
     out.join("timings.jsonl")
-}
-
-/// Where an output folder says what was run.
-pub fn about_path(out: &Path) -> PathBuf {
-    out.join("experiment.json")
 }
 
 /// Where the image of an item is.
@@ -473,62 +467,6 @@ pub struct Timing {
     pub load: Option<f64>,
 }
 
-/// `experiment.json`: what a folder's rows are the results of. Free of anything from a clock.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct About {
-    /// Row format, [`SCHEMA`].
-    pub schema: u32,
-    /// Version of the program.
-    pub version: String,
-    /// The command that makes this folder.
-    pub command: String,
-    /// The experiment as it was read, defaults made explicit.
-    pub experiment: Experiment,
-    /// Its scenes.
-    pub scenes: Vec<SceneFacts>,
-    /// What the plan made of the experiment, in sentences.
-    pub notes: Vec<String>,
-    /// Sets of samplers that are not done in a scene, because another one means the same there.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub left_out: Vec<LeftOut>,
-    /// Where the experiment and its scenes were read from.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub source: Option<Source>,
-    /// The algorithm numbers of the program that wrote this.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub algorithms: Option<Algorithms>,
-}
-
-impl About {
-    /// Whether a row is about a scene as it is described here; one that does not say is.
-    pub fn fits(&self, row: &Row) -> bool {
-        let made_of = row.made_with().and_then(|made| made.scene.as_deref());
-        let (Some(name), Some(made_of)) = (row.scene(), made_of) else { return true };
-        self.scenes.iter().any(|scene| scene.name == name && short_hash(&scene.content_hash) == made_of)
-    }
-}
-
-/// What to read again to plan the same experiment: as given on the command line, so relative to where that was given.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Source {
-    /// The experiment file.
-    pub file: String,
-    /// Keys changed in the scene files.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub sets: Vec<String>,
-}
-
-/// A set of samplers that means in one scene, for the decisions that the scene makes, the same as another one.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct LeftOut {
-    /// Scene name.
-    pub scene: String,
-    /// The set in canonical form.
-    pub sampler: String,
-    /// The one that is done, in canonical form.
-    pub same_as: String,
-}
-
 /// Reads `results.jsonl`: all whole rows, in the order of the file.
 ///
 /// # Errors
@@ -543,15 +481,6 @@ pub fn read(path: &Path) -> Result<Vec<Row>> {
 /// As [`read`].
 pub fn read_timings(path: &Path) -> Result<Vec<Timing>> {
     Ok(lines(path, parse_timing)?.0)
-}
-
-/// Reads `experiment.json`.
-///
-/// # Errors
-/// Kind `Input` where it is missing or does not read.
-pub fn read_about(path: &Path) -> Result<About> {
-    let bad = |e: &dyn std::fmt::Display| Error::input(path.display(), format!("expected what was run, found: {e}"));
-    serde_json::from_slice(&std::fs::read(path).map_err(|e| bad(&e))?).map_err(|e| bad(&e))
 }
 
 /// One line of `timings.jsonl`.

@@ -126,6 +126,8 @@ pub(super) fn stale_rows(plan: &Plan, rows: &[Row]) -> Vec<(String, usize)> {
 
 /// What is to be done, by reason. A row that was an item's before something changed says what.
 fn missing<'a>(plan: &Plan, standing: &'a Standing, superseded: impl Iterator<Item = &'a Row>) -> Vec<Missing> {
+    let superseded: Vec<&Row> = superseded.collect();
+    let aside: HashMap<&str, &Row> = superseded.iter().map(|row| (row.id(), *row)).collect();
     let mut before: HashMap<String, &Row> = HashMap::new();
     for row in standing.in_file.iter().rev().chain(superseded) {
         before.entry(slot_of_row(row)).or_insert(row);
@@ -135,8 +137,8 @@ fn missing<'a>(plan: &Plan, standing: &'a Standing, superseded: impl Iterator<It
         let reason = match state {
             State::Done => continue,
             State::ImageMissing => Reason::ImageLost,
+            _ if aside.get(item.id.as_str()).is_some_and(|row| is_result_of(row, item)) => Reason::Aside,
             State::Missing => match standing.rows.get(&item.id).or_else(|| before.get(&slot_of_item(item)).copied()) {
-                Some(row) if row.id() == item.id && is_result_of(row, item) => Reason::Aside,
                 Some(row) => difference(row, item),
                 None => Reason::Never,
             },
