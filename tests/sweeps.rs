@@ -445,6 +445,12 @@ fn torn_and_damaged_files_are_noticed_and_made_good() {
     assert_eq!(desk.status("a"), (4, vec!["image lost".to_owned()]));
     desk.run("a", &[]).with(0, &["not the image that was written, so it is made again"]);
     desk.assert_same("a", &expected);
+    // A row taken out from the middle.
+    let without: String = text.split_inclusive('\n').filter(|line| !line.contains("\"replicate\":2,\"seed")).collect();
+    std::fs::write(&rows, without).unwrap();
+    desk.lab(&["report", "a"]).with(4, &["rows of single replicates"]);
+    desk.run("a", &[]).with(0, &[]);
+    desk.assert_same("a", &expected);
     // A broken line elsewhere is no accident of ours: it is named, and nothing is touched.
     std::fs::write(&rows, text.replacen("\"schema\":1", "\"schema\":", 2)).unwrap();
     let before = files(&desk.path("a"));

@@ -41,11 +41,12 @@ pub struct About {
 }
 
 impl About {
-    /// Whether a row is about a scene as it is described here; one that does not say is.
+    /// Whether a row is about a scene as it is described here; one that does not say counts as such.
     pub fn fits(&self, row: &Row) -> bool {
         let made_of = row.made_with().and_then(|made| made.scene.as_deref());
         let (Some(name), Some(made_of)) = (row.scene(), made_of) else { return true };
-        self.scenes.iter().any(|scene| scene.name == name && short_hash(&scene.content_hash) == made_of)
+        let scene = self.scenes.iter().find(|scene| scene.name == name);
+        scene.is_none_or(|scene| short_hash(&scene.content_hash) == made_of)
     }
 }
 
