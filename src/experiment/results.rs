@@ -201,7 +201,7 @@ pub struct ImageRow {
     pub size: Size,
     /// Mean over all pixel-channels.
     pub mean: f64,
-    /// Digest of the pixels ([`pixel_hash`](super::identity::pixel_hash)): equal where two images are equal bit for bit.
+    /// Digest of the pixels ([`pixel_hash`]): equal where two images are equal bit for bit.
     pub pixels: String,
     /// What differs from the image that this one is another making of; absent where there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
