@@ -16,6 +16,8 @@ pub enum ErrorKind {
     Write,
     /// Work is missing or failed; what exists is reported: exit code 4.
     Incomplete,
+    /// Told to end before the work was done; nothing is lost and the same command goes on: exit code 130.
+    Interrupted,
 }
 
 /// Where something went wrong, and what was expected and found there.
@@ -53,13 +55,19 @@ impl Error {
         Self { kind: ErrorKind::Incomplete, place: place.to_string(), what: what.to_string() }
     }
 
-    /// The process exit code of this kind of error: 1 to 4.
+    /// Work that was told to end early.
+    pub fn interrupted(place: impl fmt::Display, what: impl fmt::Display) -> Self {
+        Self { kind: ErrorKind::Interrupted, place: place.to_string(), what: what.to_string() }
+    }
+
+    /// The process exit code of this kind of error: 1 to 4, or 130.
     pub fn exit_code(&self) -> u8 {
         match self.kind {
             ErrorKind::Failed => 1,
             ErrorKind::Input => 2,
             ErrorKind::Write => 3,
             ErrorKind::Incomplete => 4,
+            ErrorKind::Interrupted => 130,
         }
     }
 }

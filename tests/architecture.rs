@@ -50,6 +50,7 @@ const FLOORS: &[Floor] = &[
 const DOORS: &[(&str, &[&str])] = &[
     ("clap", &["main"]),
     ("indicatif", &["main"]),
+    ("signal_hook", &["main"]),
     ("serde_json", &["main", "experiment", "scene"]),
     ("plotters", &["report"]),
     ("ttf_noto_sans", &["report"]),

@@ -400,6 +400,10 @@ const BAD_ARGUMENTS: &[(&[&str], &[&str])] = &[
     (&["run", "none.json"], &["none.json: expected a readable JSON file", "found"]),
     (&["run", "a.json"], &["a.json: expected the key \"name\", found none"]),
     (&["report", "none"], &["none", "expected", "found"]),
+    (&["status", "none"], &["none/experiment.json: expected what was run", "found"]),
+    (&["merge", "none", "--out", "m"], &["none/experiment.json: expected what was run", "found"]),
+    (&["merge", "--out", "m"], &["<DIR>..."]),
+    (&["run", "e.json", "--shard", "3/2"], &["--shard: expected I/N with 1 ≤ I ≤ N", "found \"3/2\""]),
 ];
 
 #[test]
@@ -806,7 +810,9 @@ fn explain_tells_what_each_decision_reads() {
 #[test]
 fn help_and_version_go_to_stdout() {
     let help = run_in(Path::new("."), &["--help"]).fine();
-    for command in ["run", "report", "render", "points", "measure", "config", "explain", "Exit codes"] {
+    for command in
+        ["run", "report", "status", "merge", "render", "points", "measure", "config", "explain", "Exit codes"]
+    {
         assert!(help.contains(command), "{command}");
     }
     assert_eq!(run_in(Path::new("."), &["--version"]).fine(), format!("sampler-lab {}\n", env!("CARGO_PKG_VERSION")));

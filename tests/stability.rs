@@ -229,7 +229,18 @@ fn a_power_of_two_as_the_unit_of_length_changes_no_bit() {
 
 fn request<'a>(sampler: &'a str, spp: u32, variant: Variant) -> RenderRequest<'a> {
     let (estimator, stage) = (Estimator::Unbiased, Stage::Final);
-    RenderRequest { scene: "lights", sampler, spp, seed: 17, size: SIZE, estimator, stage, variant, threads: 2 }
+    RenderRequest {
+        scene: "lights",
+        sampler,
+        spp,
+        seed: 17,
+        size: SIZE,
+        estimator,
+        stage,
+        variant,
+        threads: 2,
+        stop: None,
+    }
 }
 
 /// The mean of sample 0, again sample 0, and samples 1, 2 and 3: five samples of which one is there twice. Each mean is rounded

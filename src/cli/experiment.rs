@@ -1,23 +1,26 @@
-//! `run` and `report`: experiments.
+//! `run`: experiments.
 
 use std::cell::Cell;
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use sampler_lab::error::Result;
-use sampler_lab::experiment::execute::{Options, execute};
+use sampler_lab::experiment::execute::{Options, Outcome, execute_locked};
 use sampler_lab::experiment::lab::Lab;
 use sampler_lab::experiment::plan::plan;
 use sampler_lab::experiment::progress::{Progress, Tick};
-use sampler_lab::experiment::results::kind_name;
+use sampler_lab::experiment::results::{Source, kind_name};
+use sampler_lab::experiment::shards::Shard;
 use sampler_lab::experiment::spec::Experiment;
+use sampler_lab::experiment::status::Status;
 use sampler_lab::experiment::survey::{Standing, Survey};
-use sampler_lab::report;
+use sampler_lab::report::{self, Written};
 use serde_json::json;
 
+use super::signals::stop_flag;
 use super::{SceneArgs, WorkArgs, print, print_json};
 
 /// Arguments of `run`.
@@ -34,6 +37,9 @@ pub struct Run {
     /// Forget what the folder holds and do everything again
     #[arg(long)]
     fresh: bool,
+    /// Do one part of N alone; `merge` joins the parts
+    #[arg(long, value_name = "I/N")]
+    shard: Option<String>,
     /// One JSON document on stdout
     #[arg(long)]
     json: bool,
@@ -46,6 +52,7 @@ pub struct Run {
 impl Run {
     /// Renders what is missing, then writes the report.
     pub fn run(self) -> Result<()> {
+        let shard = self.shard.as_deref().map(Shard::parse).transpose()?;
         let experiment = Experiment::read(&self.experiment)?;
         let out = self.out.clone().unwrap_or_else(|| PathBuf::from("reports").join(&experiment.name));
         let lab = Lab::new(&self.experiment, self.files.options());
@@ -53,40 +60,70 @@ impl Run {
         self.work.warn(&lab.warnings());
         self.work.warn(&plan.notes);
         let standing = if self.fresh { Standing::nothing(&plan) } else { Standing::read(&plan, &out)? };
-        let survey = Survey::new(&plan, &standing, &out, self.work.threads());
+        let part = shard.map_or(0..plan.items.len(), |shard| shard.positions(&plan));
+        let survey = Survey::of_part(&plan, &standing, &out, self.work.threads(), part);
         if self.dry_run {
+            if !self.fresh {
+                let stale = Status::read(&plan, &out)?.stale;
+                let note = |(why, rows): &(String, usize)| format!("{rows} rows would be put aside: {why}");
+                self.work.warn(&stale.iter().map(note).collect::<Vec<_>>());
+            }
             return if self.json { print_json(&survey_json(&survey)) } else { print(&format!("{survey}\n")) };
         }
         if !self.work.quiet {
-            eprintln!("{} -> {}\n{survey}", self.experiment.display(), out.display());
+            let part = shard.map_or(String::new(), |shard| format!(", shard {shard}"));
+            eprintln!("{} -> {}{part}\n{survey}", self.experiment.display(), out.display());
         }
+        let stop = stop_flag()?;
         let mut options = Options::new(self.work.threads(), self.command());
         options.fresh = self.fresh;
+        options.shard = shard;
+        options.source = Some(Source { file: self.experiment.display().to_string(), sets: self.files.set.clone() });
+        options.stop = Some(&stop);
         let bar = Bar::new(self.work.quiet);
-        let outcome = execute(&plan, &lab, &out, &bar, &options)?;
+        // Held until the report is written: it is about these rows.
+        let (outcome, _lock) = execute_locked(&plan, &lab, &out, &bar, &options)?;
         bar.bar.finish_and_clear();
-        let written = report::write(&out)?;
+        if outcome.interrupted {
+            return outcome.check();
+        }
+        let status = Status::read(&plan, &out)?;
+        // A part of the results has no report of its own; the last part makes the whole.
+        let is_part = shard.is_some() && status.done < status.items;
+        let written = if is_part { None } else { Some(report::write(&out)?) };
+        self.say(&out, &outcome, written.as_ref(), &status)?;
+        outcome.check()
+    }
+
+    /// What was done: JSON on stdout, or a line or two on stderr.
+    fn say(&self, out: &Path, outcome: &Outcome, written: Option<&Written>, status: &Status) -> Result<()> {
+        let failed = outcome.failures.len();
         if self.json {
-            print_json(&json!({
+            return print_json(&json!({
                 "folder": out.display().to_string(),
-                "report": written.report.display().to_string(),
+                "report": written.map(|written| written.report.display().to_string()),
+                "shard": self.shard,
                 "items": outcome.items,
                 "found": outcome.found,
                 "done": outcome.done,
-                "failed": outcome.failures.len(),
+                "failed": failed,
                 "samples": outcome.samples,
-            }))?;
-        } else if !self.work.quiet {
-            eprintln!(
-                "{} items: {} found, {} done, {} failed",
-                outcome.items,
-                outcome.found,
-                outcome.done,
-                outcome.failures.len()
-            );
-            eprintln!("report: {}", written.report.display());
+            }));
         }
-        outcome.check()
+        if !self.work.quiet {
+            let Outcome { items, found, done, .. } = outcome;
+            eprintln!("{items} items: {found} found, {done} done, {failed} failed");
+            match written {
+                Some(written) => eprintln!("report: {}", written.report.display()),
+                None => eprintln!(
+                    "{} of all {} items are in {}; when every shard is done, `sampler-lab merge DIR… --out DIR` joins them and writes the report",
+                    status.done,
+                    status.items,
+                    out.display()
+                ),
+            }
+        }
+        Ok(())
     }
 
     /// The command that makes this folder, without what does not change a byte of it.
@@ -113,27 +150,6 @@ fn survey_json(survey: &Survey) -> serde_json::Value {
         "memory_bytes": survey.memory_bytes,
         "disk_bytes": survey.disk_bytes,
     })
-}
-
-/// Arguments of `report`.
-#[derive(Args)]
-pub struct Report {
-    /// Results folder, such as reports/assignment-4
-    folder: PathBuf,
-    /// Say nothing but errors on stderr
-    #[arg(long, short)]
-    quiet: bool,
-}
-
-impl Report {
-    /// Rewrites the report.
-    pub fn run(self) -> Result<()> {
-        let written = report::write(&self.folder)?;
-        if !self.quiet {
-            eprintln!("report: {}", written.report.display());
-        }
-        written.check()
-    }
 }
 
 /// A bar over samples with rate and time left on a terminal; elsewhere a line every ten seconds.

@@ -2,8 +2,10 @@
 
 mod compare;
 mod experiment;
+mod folders;
 mod image;
 mod sets;
+mod signals;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -32,7 +34,11 @@ enum Command {
     /// Run an experiment: render what is missing, then write the report
     Run(experiment::Run),
     /// Rewrite the report of a results folder from its stored rows; renders nothing
-    Report(experiment::Report),
+    Report(folders::Report),
+    /// Say what a results folder holds of its experiment: done, missing or stale, and why
+    Status(folders::Status),
+    /// Join the folders of shards, in any order, then write the report; renders nothing
+    Merge(folders::Merge),
     /// Render one image
     Render(image::Render),
     /// Draw and write point sets: the sheet's Figure 2
@@ -50,9 +56,12 @@ enum Command {
 impl Cli {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
+        signals::survive_file_limit()?;
         match self.command {
             Command::Run(args) => args.run(),
             Command::Report(args) => args.run(),
+            Command::Status(args) => args.run(),
+            Command::Merge(args) => args.run(),
             Command::Render(args) => args.run(),
             Command::Points(args) => args.run(),
             Command::Measure(args) => args.run(),

@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::sync::atomic::AtomicBool;
 
 use serde::{Deserialize, Serialize};
 
@@ -145,7 +146,7 @@ impl SceneFacts {
 }
 
 /// Numbers that stand for the code behind an item: each is raised when, and only when, that code's bits change.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Algorithms {
     /// Rays, shading, film.
     pub renderer: u32,
@@ -180,6 +181,8 @@ pub struct RenderRequest<'a> {
     pub variant: Variant,
     /// Threads to use; no bit depends on it.
     pub threads: usize,
+    /// Once set from elsewhere, the image is not wanted any more.
+    pub stop: Option<&'a AtomicBool>,
 }
 
 /// Values of point-set metrics by name; `None` where a metric is not defined for the set.
@@ -253,7 +256,8 @@ pub trait Backend {
     /// Renders one image. Every pixel is finite.
     ///
     /// # Errors
-    /// Kind `Incomplete` where a sample is not finite, naming its pixel and sample index.
+    /// Kind `Incomplete` where a sample is not finite, naming its pixel and sample index; kind `Interrupted` where it was
+    /// stopped.
     fn render(&self, request: &RenderRequest) -> Result<Image>;
 
     /// Distance of the plane of focus in an image of this size, scene units; `None` for a pinhole. With auto focus it

@@ -4,24 +4,30 @@
 //! `results.jsonl`; a finished image is on disk before its row is. When the last item is done the rows are written
 //! once more, in plan order and in one piece, so the bytes do not depend on how often the run was interrupted.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::backend::{Backend, RenderRequest, Size};
+use super::folder::{self, FolderLock, ShardNote};
 use super::identity::pixel_hash;
 use super::images::Images;
+use super::lines::{line, write_lines};
 use super::machine;
 use super::measure::{self, ReferenceImages};
 use super::plan::{EnsembleWork, ImageWork, Plan, PointsWork, ReferenceSource, ReferenceWork, Work, WorkItem};
 use super::progress::{Meter, Progress};
 use super::results::{
-    self, About, EnsembleRow, ImageErrors, ImageRow, Kind, PointsRow, ReferenceRow, Row, SCHEMA, Timing,
+    self, EnsembleRow, ImageErrors, ImageRow, Kind, PointsRow, ReferenceRow, Row, SCHEMA, Source, Timing,
 };
+use super::shards::Shard;
+use super::status::stale_rows;
+use super::superseded::{self, Settled};
 use super::survey::{Limits, Standing, State, Survey};
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::Image;
@@ -34,11 +40,15 @@ pub struct Options<'a> {
     pub fresh: bool,
     /// The command that makes this folder, for provenance; the same for every run of the same experiment.
     pub command: String,
+    /// Where the experiment was read from.
+    pub source: Option<Source>,
+    /// Do this part of the plan alone.
+    pub shard: Option<Shard>,
     /// What the run may use.
     pub limits: Limits,
     /// End after so many items, as a kill would.
     pub at_most: Option<usize>,
-    /// Set from elsewhere: end after the item at hand.
+    /// Set from elsewhere: end soon. An image at hand is given up at its next tile, anything else is ended first.
     pub stop: Option<&'a AtomicBool>,
 }
 
@@ -46,7 +56,8 @@ impl Options<'_> {
     /// Options of a plain run.
     pub fn new(threads: usize, command: impl Into<String>) -> Self {
         let (limits, command) = (Limits::default(), command.into());
-        Self { threads: threads.max(1), fresh: false, command, limits, at_most: None, stop: None }
+        let threads = threads.max(1);
+        Self { threads, fresh: false, command, source: None, shard: None, limits, at_most: None, stop: None }
     }
 }
 
@@ -64,7 +75,7 @@ pub struct Failure {
 /// What a run did.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// Items of the plan.
+    /// Items of the plan, or of the part of it that was to be done.
     pub items: usize,
     /// Items that were done before.
     pub found: usize,
@@ -82,9 +93,16 @@ impl Outcome {
     /// Nothing is missing.
     ///
     /// # Errors
-    /// Kind `Incomplete` that counts what is missing and gives the first reason.
+    /// Kind `Incomplete` that counts what is missing and gives the first reason; kind `Interrupted` where the run was told
+    /// to end.
     pub fn check(&self) -> Result<()> {
         let missing = self.items - self.found - self.done;
+        if self.interrupted {
+            let done = self.found + self.done;
+            let what =
+                format!("told to end with {done} of {} items done; the same command goes on from there", self.items);
+            return Err(Error::interrupted("run", what));
+        }
         match self.failures.first() {
             None if missing == 0 => Ok(()),
             None => Err(Error::incomplete("run", format!("expected {} items, {missing} are missing", self.items))),
@@ -109,94 +127,68 @@ pub fn execute(
     progress: &dyn Progress,
     options: &Options,
 ) -> Result<Outcome> {
+    execute_locked(plan, backend, out, progress, options).map(|(outcome, _)| outcome)
+}
+
+/// As [`execute`]; the folder stays locked until the lock is dropped, so that a report can be written of just these rows.
+///
+/// # Errors
+/// As [`execute`].
+pub fn execute_locked(
+    plan: &Plan,
+    backend: &dyn Backend,
+    out: &Path,
+    progress: &dyn Progress,
+    options: &Options,
+) -> Result<(Outcome, FolderLock)> {
+    let part = options.shard.map_or(0..plan.items.len(), |shard| shard.positions(plan));
     // What needs more than it may is refused before anything is made.
     let first_look = if options.fresh { Standing::nothing(plan) } else { Standing::read(plan, out)? };
-    Survey::new(plan, &first_look, out, options.threads).refuse_above(&options.limits, &plan.experiment.place)?;
+    let survey = Survey::of_part(plan, &first_look, out, options.threads, part.clone());
+    survey.refuse_above(&options.limits, &plan.experiment.place)?;
     if !options.fresh {
-        refuse_another_experiment(plan, out)?;
+        folder::refuse_another_experiment(plan, out)?;
     }
-    let _lock = lock(out)?;
+    let lock = FolderLock::take(out)?;
     if options.fresh {
-        forget(out)?;
+        folder::forget(out)?;
     }
-    let standing = Standing::read(plan, out)?;
-    let survey = Survey::new(plan, &standing, out, options.threads);
-    write_about(plan, out, &options.command)?;
-    let found = standing.states.iter().filter(|&&state| state == State::Done).count();
-    let meter = Meter::new(found, plan.items.len(), survey.samples_left);
+    let standing = settled(plan, out, progress)?;
+    let survey = Survey::of_part(plan, &standing, out, options.threads, part.clone());
+    folder::write_about(plan, out, &options.command, options.source.as_ref())?;
+    if let Some(shard) = options.shard {
+        folder::write_note(out, Some(ShardNote { count: shard.count }))?;
+    }
+    let found = standing.states[part.clone()].iter().filter(|&&state| state == State::Done).count();
+    let is_else_done = |run: &Run| {
+        let mut others = (0..plan.items.len()).filter(|position| !part.contains(position));
+        others.all(|position| run.states[position] == State::Done)
+    };
+    let meter = Meter::new(found, part.len(), survey.samples_left);
     let mut run = Run::new(plan, backend, out, progress, options, standing, meter)?;
-    let (done, interrupted) = run.all_items()?;
+    let (done, interrupted) = run.all_items(&part)?;
     if !interrupted {
         run.write_in_plan_order()?;
+        if found + done == part.len() && is_else_done(&run) {
+            folder::write_note(out, None)?;
+        }
     }
     let samples = run.meter.tick().samples_done;
-    Ok(Outcome { items: plan.items.len(), found, done, failures: run.failures, interrupted, samples })
+    Ok((Outcome { items: part.len(), found, done, failures: run.failures, interrupted, samples }, lock))
 }
 
-/// A folder keeps the results of one experiment: it may grow or change, but another's rows are not put aside for it.
-fn refuse_another_experiment(plan: &Plan, out: &Path) -> Result<()> {
-    let path = results::about_path(out);
-    if !path.exists() {
-        return Ok(());
+/// What the folder holds of the plan, after what no longer belongs to it was put aside, and what does again is back.
+fn settled(plan: &Plan, out: &Path, progress: &dyn Progress) -> Result<Standing> {
+    let standing = Standing::read(plan, out)?;
+    let settled = superseded::settle(plan, out, &standing)?;
+    for (why, count) in stale_rows(plan, &settled.aside) {
+        progress.warn(&format!("{count} rows put aside in superseded.jsonl: {why}"));
     }
-    let (there, wanted) = (results::read_about(&path)?.experiment, &plan.experiment);
-    if (&there.name, there.seed) == (&wanted.name, wanted.seed) {
-        return Ok(());
+    if settled.back > 0 {
+        progress
+            .warn(&format!("{} rows taken back from superseded.jsonl: what they were made with is back", settled.back));
     }
-    let what = format!(
-        "expected results of the experiment {:?} with seed {}, found those of {:?} with seed {}; give another --out, or --fresh to do away with them",
-        wanted.name, wanted.seed, there.name, there.seed
-    );
-    Err(Error::input(path.display(), what))
-}
-
-/// Two runs that append to the same files would tear each other's lines. The system lets go of the lock with the process.
-fn lock(out: &Path) -> Result<File> {
-    let path = out.join("images").join(".lock");
-    let fail = |e: std::io::Error| Error::write(&path, format!("cannot write: {e}"));
-    std::fs::create_dir_all(out.join("images")).map_err(fail)?;
-    let file = File::create(&path).map_err(fail)?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(std::fs::TryLockError::WouldBlock) => {
-            Err(Error::input(out.display(), "expected no other run in this folder, found one at work"))
-        }
-        Err(std::fs::TryLockError::Error(e)) => Err(fail(e)),
-    }
-}
-
-/// Removes the rows, timings and images of earlier runs, and nothing else.
-fn forget(out: &Path) -> Result<()> {
-    let fail = |path: &Path, e: std::io::Error| Error::write(path, format!("cannot remove: {e}"));
-    let mut paths = vec![results::results_path(out), results::timings_path(out)];
-    let images = out.join("images");
-    for entry in std::fs::read_dir(&images).map_err(|e| fail(&images, e))? {
-        let path = entry.map_err(|e| fail(&images, e))?.path();
-        if path.extension().is_some_and(|ending| ending == "exr") {
-            paths.push(path);
-        }
-    }
-    for path in paths.iter().filter(|path| path.exists()) {
-        std::fs::remove_file(path).map_err(|e| fail(path, e))?;
-    }
-    Ok(())
-}
-
-/// Writes down what is run here.
-fn write_about(plan: &Plan, out: &Path, command: &str) -> Result<()> {
-    let about = About {
-        schema: SCHEMA,
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        command: command.to_owned(),
-        experiment: plan.experiment.clone(),
-        scenes: plan.scenes.clone(),
-        notes: plan.notes.clone(),
-        left_out: plan.left_out.clone(),
-    };
-    let path = results::about_path(out);
-    let mut text = serde_json::to_string_pretty(&about).map_err(|e| Error::write(&path, e))?;
-    text.push('\n');
-    results::write_if_changed(&path, text.as_bytes())
+    if settled == Settled::default() { Ok(standing) } else { Standing::read(plan, out) }
 }
 
 /// A file to which whole lines are appended.
@@ -244,7 +236,7 @@ struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// Opens the logs, after cutting off what a kill left torn.
+    /// Opens the logs.
     fn new(
         plan: &'a Plan,
         backend: &'a dyn Backend,
@@ -254,12 +246,8 @@ impl<'a> Run<'a> {
         standing: Standing,
         meter: Meter,
     ) -> Result<Self> {
-        let Standing { rows, in_file, timings, states, is_clean } = standing;
+        let Standing { rows, timings, states, .. } = standing;
         let (results_path, timings_path) = (results::results_path(out), results::timings_path(out));
-        if !is_clean {
-            results::write_lines(&results_path, in_file.iter())?;
-            results::write_lines(&timings_path, sorted(&timings).into_iter())?;
-        }
         Ok(Self {
             plan,
             backend,
@@ -280,17 +268,21 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Goes through the plan; how many items were done, and whether it ended early.
-    fn all_items(&mut self) -> Result<(usize, bool)> {
+    /// Goes through the plan's items at `part`; how many were done, and whether it ended early.
+    fn all_items(&mut self, part: &Range<usize>) -> Result<(usize, bool)> {
         let released = self.plan.released_after();
         let mut done = 0;
         for (position, released) in released.iter().enumerate() {
-            if self.states[position] != State::Done {
+            if part.contains(&position) && self.states[position] != State::Done {
                 let told = self.options.stop.is_some_and(|stop| stop.load(Ordering::Relaxed));
                 if told || self.options.at_most == Some(done) {
                     return Ok((done, true));
                 }
-                done += usize::from(self.one_item(position)?);
+                match self.one_item(position) {
+                    Ok(is_done) => done += usize::from(is_done),
+                    Err(error) if error.kind == ErrorKind::Interrupted => return Ok((done, true)),
+                    Err(error) => return Err(error),
+                }
             }
             self.images.release(released);
         }
@@ -305,14 +297,14 @@ impl<'a> Run<'a> {
         let result = match self.states[position] {
             // The row is right already: only its image is wanted.
             State::ImageMissing => self.image(&item.id).map(|_| ()),
-            _ => self.row_of(item).and_then(|row| self.record(row)),
+            _ => self.row_of(item).and_then(|row| self.record(item, row)),
         };
         let is_done = match result {
             Ok(()) => {
                 self.meter.add_item();
                 true
             }
-            Err(error) if error.kind == ErrorKind::Write => return Err(error),
+            Err(error) if matches!(error.kind, ErrorKind::Write | ErrorKind::Interrupted) => return Err(error),
             Err(error) => {
                 self.progress.warn(&format!("{}: {error}", item.label()));
                 self.failures.push(Failure { id: item.id.clone(), label: item.label(), error });
@@ -323,8 +315,9 @@ impl<'a> Run<'a> {
         Ok(is_done)
     }
 
-    /// Appends a row.
-    fn record(&mut self, row: Row) -> Result<()> {
+    /// Appends a row, which says what it was made with.
+    fn record(&mut self, item: &WorkItem, mut row: Row) -> Result<()> {
+        row.set_made_with(&item.made_with);
         self.results_log.append(row.to_line())?;
         self.rows.insert(row.id().to_owned(), row);
         Ok(())
@@ -371,6 +364,7 @@ impl<'a> Run<'a> {
             mean: measure::mean_value(&image.pixels),
             pixels: pixel_hash(&image.pixels),
             twin,
+            made_with: None,
             errors,
         })
     }
@@ -395,6 +389,7 @@ impl<'a> Run<'a> {
             noise_mse: reference.noise_mse(),
             mean: reference.mean_value(),
             pixels: reference.pixels(),
+            made_with: None,
         })
     }
 
@@ -424,6 +419,7 @@ impl<'a> Run<'a> {
             bias: e.bias,
             error_autocorrelation,
             members: work.members.clone(),
+            made_with: None,
         })
     }
 
@@ -440,6 +436,7 @@ impl<'a> Run<'a> {
             seed: work.seed,
             metrics_algorithm: item.metrics_algorithm,
             metrics,
+            made_with: None,
         })
     }
 
@@ -474,6 +471,10 @@ impl<'a> Run<'a> {
         if is_timed && let Some(image) = self.images.load(id, size, pixels.as_deref()) {
             return Ok(image);
         }
+        let path = results::image_path(self.out, id);
+        if is_timed && path.exists() {
+            self.progress.warn(&format!("{}: not the image that was written, so it is made again", path.display()));
+        }
         let made = self.make(item, size, pixels.as_deref());
         if let Err(error) = &made {
             self.failed_images.insert(id.to_owned(), error.clone());
@@ -505,7 +506,7 @@ impl<'a> Run<'a> {
         if !self.timings.contains_key(&item.id) {
             let (id, host) = (item.id.clone(), self.host.clone());
             let timing = Timing { id, seconds, samples, host, threads, load };
-            self.timings_log.append(results::line(&timing))?;
+            self.timings_log.append(line(&timing))?;
             self.timings.insert(item.id.clone(), timing);
         }
         self.meter.add_samples(samples);
@@ -514,7 +515,10 @@ impl<'a> Run<'a> {
     }
 
     /// What to ask the backend for, where the image is rendered.
-    fn request<'w>(&self, item: &'w WorkItem) -> Option<RenderRequest<'w>> {
+    fn request<'w>(&self, item: &'w WorkItem) -> Option<RenderRequest<'w>>
+    where
+        'a: 'w,
+    {
         let Work::Image(work) = &item.work else { return None };
         Some(RenderRequest {
             scene: &work.scene,
@@ -526,6 +530,7 @@ impl<'a> Run<'a> {
             stage: work.stage,
             variant: work.variant,
             threads: self.options.threads,
+            stop: self.options.stop,
         })
     }
 
@@ -568,27 +573,20 @@ impl<'a> Run<'a> {
 
     /// The last step: rows and timings of this plan, in its order, each file in one piece.
     fn write_in_plan_order(&mut self) -> Result<()> {
-        let failed: HashSet<&str> = self.failures.iter().map(|failure| failure.id.as_str()).collect();
-        let mut rows = Vec::new();
-        for (item, state) in self.plan.items.iter().zip(&self.states) {
-            // The row of a failed item, if it has one, was measured another way; where only the image is missing it holds.
-            let is_stale = failed.contains(item.id.as_str()) && *state == State::Missing;
-            if let Some(mut row) = self.rows.get(&item.id).filter(|_| !is_stale).cloned() {
-                if let Some(sampler) = item.sampler() {
-                    row.set_names(self.plan.names(sampler));
-                }
-                rows.push(row);
-            }
-        }
-        results::write_lines(&results::results_path(self.out), rows.iter())?;
-        let timings = self.plan.items.iter().filter_map(|item| self.timings.get(&item.id));
-        results::write_lines(&results::timings_path(self.out), timings)
+        write_in_plan_order(self.plan, self.out, &self.rows, &self.timings)
     }
 }
 
-/// Timings in an order of their own.
-fn sorted(timings: &HashMap<String, Timing>) -> Vec<&Timing> {
-    let mut sorted: Vec<&Timing> = timings.values().collect();
-    sorted.sort_by(|a, b| a.id.cmp(&b.id));
-    sorted
+/// Writes rows and timings in the order of the plan, each file in one piece; what the plan knows better than a row – what
+/// the experiment calls the sampler, what the row was made with – is as the plan says.
+pub(super) fn write_in_plan_order(
+    plan: &Plan,
+    out: &Path,
+    rows: &HashMap<String, Row>,
+    timings: &HashMap<String, Timing>,
+) -> Result<()> {
+    let rows: Vec<Row> =
+        plan.items.iter().filter_map(|item| Some(plan.as_written(item, rows.get(&item.id)?.clone()))).collect();
+    write_lines(&results::results_path(out), rows.iter())?;
+    write_lines(&results::timings_path(out), plan.items.iter().filter_map(|item| timings.get(&item.id)))
 }

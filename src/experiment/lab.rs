@@ -4,14 +4,16 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use super::backend::{Algorithms, Backend, PointMetrics, RenderRequest, SceneFacts, Size, Variant};
 use super::exact;
+use super::results::About;
 use crate::error::{Error, Result};
 use crate::film::Image;
 use crate::render;
 use crate::sampling::hash::derive;
-use crate::sampling::{self, PointSource, Preset, SampleLayout, Sampler, SamplerSet, SamplerSpec, point_set};
+use crate::sampling::{self, Decision, PointSource, Preset, SampleLayout, Sampler, SamplerSet, SamplerSpec, point_set};
 use crate::scene::compile::{Scene, Stage, check_reach};
 use crate::scene::load::{self, LoadedScene, OpenOptions};
 use crate::scene::scale::scaled;
@@ -46,8 +48,6 @@ const SCENE_COPIES: u64 = 5;
 /// A scene that was opened.
 struct Opened {
     loaded: LoadedScene,
-    /// Decisions of the full picture.
-    layout: SampleLayout,
     /// The full scene in its own scale always, one other at the most.
     compiled: HashMap<Compiled, Scene>,
 }
@@ -71,11 +71,18 @@ impl Compiled {
 }
 
 /// Renders with the lab.
+#[derive(Default)]
 pub struct Lab {
     /// Folders in which a bare scene name is looked for.
     folders: Vec<PathBuf>,
     options: OpenOptions,
     scenes: RefCell<HashMap<String, Opened>>,
+    /// Decisions of each scene's full picture.
+    layouts: RefCell<HashMap<String, SampleLayout>>,
+    /// What a folder recorded of scenes, by the experiment's name for them.
+    recorded: HashMap<String, SceneFacts>,
+    /// Scenes whose files are not there, so that what was recorded of them stood in.
+    stood_in: RefCell<Vec<String>>,
     pools: RefCell<HashMap<usize, Arc<rayon::ThreadPool>>>,
 }
 
@@ -85,7 +92,20 @@ impl Lab {
     pub fn new(experiment: &Path, options: OpenOptions) -> Self {
         let beside = experiment.parent().unwrap_or(Path::new(""));
         let folders = vec![beside.to_owned(), beside.join(".."), PathBuf::from("configs")];
-        Self { folders, options, scenes: RefCell::default(), pools: RefCell::default() }
+        Self { folders, options, ..Self::default() }
+    }
+
+    /// The same lab, for looking at results: where a scene's files are gone, what was recorded of it stands in, so that it
+    /// can be planned but not rendered.
+    #[must_use]
+    pub fn with_record(mut self, about: &About) -> Self {
+        self.recorded = about.experiment.scenes.iter().cloned().zip(about.scenes.iter().cloned()).collect();
+        self
+    }
+
+    /// A lab that opens no file: it plans what was recorded.
+    pub fn of_record(about: &About) -> Self {
+        Self::default().with_record(about)
     }
 
     /// What a person should know of the scenes opened so far, one line each.
@@ -97,6 +117,46 @@ impl Lab {
             .collect();
         lines.sort();
         lines
+    }
+
+    /// The scenes for which what was recorded had to stand in, with the reason, one line each.
+    pub fn stand_ins(&self) -> Vec<String> {
+        self.stood_in.borrow().clone()
+    }
+
+    /// What was recorded of a scene that cannot be read.
+    fn recorded_scene(&self, scene: &str, why: &Error) -> Option<SceneFacts> {
+        let facts = self.recorded.get(scene)?.clone();
+        let layout = SampleLayout::parse(&facts.layout)?;
+        self.layouts.borrow_mut().insert(facts.name.clone(), layout);
+        if !self.folders.is_empty() {
+            self.stood_in.borrow_mut().push(format!("{scene} cannot be read, so it counts as unchanged: {why}"));
+        }
+        Some(facts)
+    }
+
+    /// Reads a scene's files and keeps it open.
+    fn read_scene(&self, scene: &str) -> Result<SceneFacts> {
+        let path = self.find(scene)?;
+        let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        let loaded = load::open(&path, &self.options)?;
+        let framebuffer = loaded.config.framebuffer;
+        let size = Size { width: framebuffer.res_w, height: framebuffer.res_h };
+        let full = Scene::new(&loaded.config, loaded.mesh.clone(), (size.width, size.height), Stage::Final)?;
+        let facts = SceneFacts {
+            name: name.clone(),
+            content_hash: loaded.content_sha256(),
+            size,
+            spp: framebuffer.sppx,
+            layout: full.layout.to_string(),
+            exact_reference: exact::closed_form(&loaded, size).is_some(),
+            lens: full.focal_depth().is_some(),
+            memory_bytes: SCENE_COPIES * full.bytes() as u64,
+        };
+        self.layouts.borrow_mut().insert(name.clone(), full.layout.clone());
+        let compiled = HashMap::from([(Compiled::full(), full)]);
+        self.scenes.borrow_mut().insert(name, Opened { loaded, compiled });
+        Ok(facts)
     }
 
     /// Where the file of a scene is.
@@ -130,6 +190,11 @@ impl Lab {
         Ok(pool)
     }
 
+    /// The decisions of a scene.
+    fn layout(&self, scene: &str) -> SampleLayout {
+        self.layouts.borrow().get(scene).expect("a plan asks for scenes that it opened").clone()
+    }
+
     /// Looks at an open scene.
     fn with<T>(&self, scene: &str, look: impl FnOnce(&Opened) -> T) -> T {
         let scenes = self.scenes.borrow();
@@ -150,26 +215,7 @@ fn single(canonical: &str) -> Result<SamplerSpec> {
 
 impl Backend for Lab {
     fn open_scene(&self, scene: &str) -> Result<SceneFacts> {
-        let path = self.find(scene)?;
-        let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-        let loaded = load::open(&path, &self.options)?;
-        let framebuffer = loaded.config.framebuffer;
-        let size = Size { width: framebuffer.res_w, height: framebuffer.res_h };
-        let full = Scene::new(&loaded.config, loaded.mesh.clone(), (size.width, size.height), Stage::Final)?;
-        let facts = SceneFacts {
-            name: name.clone(),
-            content_hash: loaded.content_sha256(),
-            size,
-            spp: framebuffer.sppx,
-            layout: full.layout.to_string(),
-            exact_reference: exact::closed_form(&loaded, size).is_some(),
-            lens: full.focal_depth().is_some(),
-            memory_bytes: SCENE_COPIES * full.bytes() as u64,
-        };
-        let layout = full.layout.clone();
-        let compiled = HashMap::from([(Compiled::full(), full)]);
-        self.scenes.borrow_mut().insert(name, Opened { loaded, layout, compiled });
-        Ok(facts)
+        self.read_scene(scene).or_else(|why| self.recorded_scene(scene, &why).ok_or(why))
     }
 
     fn parse_sampler(&self, text: &str) -> Result<String> {
@@ -181,36 +227,35 @@ impl Backend for Lab {
     }
 
     fn meaning(&self, canonical: &str, scene: &str) -> String {
-        let made = |opened: &Opened| opened.layout.claims().iter().map(|claim| claim.decision).collect::<Vec<_>>();
-        set(canonical).map_or_else(|_| canonical.to_owned(), |set| set.meaning(&self.with(scene, made)))
+        let made: Vec<Decision> = self.layout(scene).claims().iter().map(|claim| claim.decision).collect();
+        set(canonical).map_or_else(|_| canonical.to_owned(), |set| set.meaning(&made))
     }
 
     fn is_random(&self, canonical: &str, scene: Option<&str>) -> bool {
         match scene {
-            Some(scene) => set(canonical).is_ok_and(|set| self.with(scene, |opened| set.is_random(&opened.layout))),
+            Some(scene) => set(canonical).is_ok_and(|set| set.is_random(&self.layout(scene))),
             None => single(canonical).is_ok_and(|spec| spec.is_random()),
         }
     }
 
     fn taken(&self, canonical: &str, scene: Option<&str>, asked: u32) -> u32 {
         match scene {
-            Some(scene) => {
-                set(canonical).map_or(asked, |set| self.with(scene, |opened| set.taken(asked, &opened.layout)))
-            }
+            Some(scene) => set(canonical).map_or(asked, |set| set.taken(asked, &self.layout(scene))),
             None => single(canonical).map_or(asked, |spec| spec.taken(asked)),
         }
     }
 
     fn check_sampler(&self, canonical: &str, scene: &str) -> Result<()> {
         let set = set(canonical)?;
-        self.with(scene, |opened| Sampler::new(set, &opened.layout, 1, 0).map(|_| ()))
+        Sampler::new(set, &self.layout(scene), 1, 0).map(|_| ())
     }
 
     fn check_variant(&self, scene: &str, variant: Variant) -> Result<()> {
-        self.with(scene, |opened| {
-            let at = |e: Error| Error { place: format!("{}: {variant}", e.place), ..e };
-            check_reach(opened.compiled[&Compiled::full()].reach() * variant.scale()).map_err(at)
-        })
+        let scenes = self.scenes.borrow();
+        // What was recorded was checked when it was made.
+        let Some(opened) = scenes.get(scene) else { return Ok(()) };
+        let at = |e: Error| Error { place: format!("{}: {variant}", e.place), ..e };
+        check_reach(opened.compiled[&Compiled::full()].reach() * variant.scale()).map_err(at)
     }
 
     fn algorithms(&self, _: &str) -> Algorithms {
@@ -248,13 +293,16 @@ impl Backend for Lab {
         let set = set(request.sampler)?;
         self.with(request.scene, |opened| {
             let scene = &opened.compiled[&Compiled::new(request.stage, request.variant)];
+            let go_on = |_| !request.stop.is_some_and(|stop| stop.load(Ordering::Relaxed));
             let pass = |number: u64, asked: u32| {
                 // The first pass draws what a single one would; a later one begins anew with numbers of its own.
                 let seed = if number == 0 { request.seed } else { derive(request.seed, &[number]) };
                 let sampler = Sampler::new(set, &scene.layout, asked, seed)?;
-                let rendered = pool.install(|| render::render(scene, &sampler));
-                let rendered = rendered.map_err(|bad| Error::incomplete(request.scene, bad))?;
-                Ok((rendered.image, sampler.samples()))
+                match pool.install(|| render::render_while(scene, &sampler, &go_on)) {
+                    Ok(Some(rendered)) => Ok((rendered.image, sampler.samples())),
+                    Ok(None) => Err(Error::interrupted(request.scene, "told to end while rendering")),
+                    Err(bad) => Err(Error::incomplete(request.scene, bad)),
+                }
             };
             let mut passes = (0..).zip(request.variant.passes(request.spp));
             let (number, asked) = passes.next().expect("an image takes a pass at least");

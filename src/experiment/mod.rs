@@ -5,22 +5,32 @@
 //! | read a file | [`spec`] | strict, pure data |
 //! | list the work | [`plan`] | pure: ids and seeds come from content |
 //! | say what is left and what it costs | [`survey`] | reads the output folder |
-//! | do it | [`execute`] | the only slow stage; can be stopped at any moment |
+//! | do it | [`execute`] | the only slow stage; can be stopped at any moment, or cut into [`shards`] |
 //! | rows | [`results`] | typed lines of `results.jsonl` |
+//! | join shards | [`merge`] | renders nothing, opens no scene |
+//! | say what is done, missing or stale | [`status`], [`why`] | reads the output folder |
 
+mod about;
 pub mod backend;
 mod compared;
 mod entry;
 mod exact;
 pub mod execute;
+pub mod folder;
 pub mod identity;
 mod images;
 pub mod lab;
+mod lines;
 mod machine;
 mod measure;
+pub mod merge;
 pub mod plan;
 pub mod progress;
 pub mod results;
+pub mod shards;
 pub mod spec;
+pub mod status;
+mod superseded;
 pub mod survey;
 pub mod variant;
+pub mod why;

@@ -12,7 +12,7 @@ use std::collections::{HashMap, HashSet};
 use super::backend::{Algorithms, Backend, Estimator, SceneFacts, Size, Stage, Variant};
 use super::compared::{read_reference_sampler, read_samplers, same_in_a_scene};
 use super::identity::{Fingerprint, SeedOf};
-use super::results::{Count, Kind, LeftOut};
+use super::results::{Count, Kind, LeftOut, MadeWith, Row, short_hash};
 use super::spec::{Experiment, Pictures};
 use crate::error::{Error, Result, did_you_mean};
 use variants::{is_seeded_as_its_twin, probed_samplers};
@@ -138,6 +138,8 @@ pub struct WorkItem {
     pub metrics_algorithm: u32,
     /// Whether a report shows the item's image itself, not only numbers about it.
     pub is_shown: bool,
+    /// What else its result depends on: the scene's content and the algorithm numbers.
+    pub made_with: MadeWith,
     /// What to do.
     pub work: Work,
 }
@@ -244,6 +246,8 @@ pub struct Plan {
     pub experiment: Experiment,
     /// Its scenes, in its order.
     pub scenes: Vec<SceneFacts>,
+    /// The algorithm numbers behind it.
+    pub algorithms: Algorithms,
     /// The compared samplers, each once, in the order in which they first occur.
     pub samplers: Vec<PlannedSampler>,
     /// The reference's sampler.
@@ -271,6 +275,16 @@ impl Plan {
             .map(|sampler| sampler.names.as_slice())
             .next()
             .unwrap_or(&[])
+    }
+
+    /// A row of an item with what the plan knows better than a row: what the experiment calls the sampler now, and what the
+    /// id vouches for.
+    pub(super) fn as_written(&self, item: &WorkItem, mut row: Row) -> Row {
+        if let Some(sampler) = item.sampler() {
+            row.set_names(self.names(sampler));
+        }
+        row.set_made_with(&item.made_with);
+        row
     }
 
     /// Ids of the images that a reference is made of: two halves, or the closed form twice.
@@ -340,6 +354,7 @@ pub fn plan(experiment: &Experiment, backend: &dyn Backend) -> Result<Plan> {
         backend,
         reference: &reference_sampler,
         left_out: &left_out,
+        scenes: &scenes,
         is_shown: false,
         items: Vec::new(),
         ids: HashSet::new(),
@@ -361,7 +376,18 @@ pub fn plan(experiment: &Experiment, backend: &dyn Backend) -> Result<Plan> {
     refuse_equal_seeds(&items, &experiment.place)?;
     let positions: HashMap<String, usize> = items.iter().enumerate().map(|(i, item)| (item.id.clone(), i)).collect();
     assert_eq!(positions.len(), items.len(), "two items of one id");
-    Ok(Plan { experiment: experiment.clone(), scenes, samplers, reference_sampler, items, notes, left_out, positions })
+    let algorithms = backend.algorithms(&reference_sampler.canonical);
+    Ok(Plan {
+        experiment: experiment.clone(),
+        scenes,
+        algorithms,
+        samplers,
+        reference_sampler,
+        items,
+        notes,
+        left_out,
+        positions,
+    })
 }
 
 /// Items that draw numbers have seeds of their own: an image must share no randomness with what it is compared with. An
@@ -433,6 +459,7 @@ struct Planner<'a> {
     backend: &'a dyn Backend,
     reference: &'a PlannedSampler,
     left_out: &'a [LeftOut],
+    scenes: &'a [SceneFacts],
     /// Whether the items added now are looked at.
     is_shown: bool,
     items: Vec<WorkItem>,
@@ -517,9 +544,36 @@ impl Planner<'_> {
         // What is asked for twice is done once: a closed form of a scene's and its pictures' one size, the plain images of a
         // count that stability is asked about.
         if self.ids.insert(id.clone()) {
-            self.items.push(WorkItem { id: id.clone(), metrics_algorithm, is_shown: self.is_shown, work });
+            let (is_shown, made_with) = (self.is_shown, self.made_with(&work));
+            self.items.push(WorkItem { id: id.clone(), metrics_algorithm, is_shown, made_with, work });
         }
         id
+    }
+
+    /// What goes into an item's id besides its own fields, in words for its row.
+    fn made_with(&self, work: &Work) -> MadeWith {
+        let content = |name: &str| {
+            self.scenes.iter().find(|scene| scene.name == name).map(|scene| short_hash(&scene.content_hash))
+        };
+        let rendered = |scene: &str, sampler: &str| {
+            let numbers = self.backend.algorithms(sampler);
+            let (renderer, estimator) = (Some(numbers.renderer), Some(numbers.estimator));
+            MadeWith { scene: content(scene), renderer, sampler: Some(numbers.sampler), estimator, exact: None }
+        };
+        match work {
+            Work::Points(work) => {
+                MadeWith { sampler: Some(self.backend.algorithms(&work.sampler).sampler), ..MadeWith::default() }
+            }
+            Work::Image(work) => rendered(&work.scene, &work.sampler),
+            Work::Ensemble(work) => rendered(&work.scene, &work.sampler),
+            Work::Reference(ReferenceWork { scene, source: ReferenceSource::Halves { sampler, .. }, .. }) => {
+                rendered(scene, sampler)
+            }
+            Work::Reference(work) => {
+                let exact = Some(self.backend.algorithms(&self.reference.canonical).exact);
+                MadeWith { scene: content(&work.scene), exact, ..MadeWith::default() }
+            }
+        }
     }
 
     /// Point-set metrics of every sampler.

@@ -8,12 +8,14 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+pub use super::about::{About, LeftOut, Source, about_path, read_about};
 pub use super::backend::{Estimator, PointMetrics, SceneFacts, Size, Stage, Variant};
 use super::backend::{estimator_word, stage_word};
 
-use super::spec::Experiment;
+use super::identity::{ID_LENGTH, pixel_hash};
+use super::lines::{line, lines};
 use crate::error::{Error, Result};
-use crate::film::write_whole;
+use crate::film::{Image, read_exr};
 use crate::stats::Estimate;
 
 /// Version of the row format, field `schema`.
@@ -29,14 +31,57 @@ pub fn timings_path(out: &Path) -> PathBuf {
     out.join("timings.jsonl")
 }
 
-/// Where an output folder says what was run.
-pub fn about_path(out: &Path) -> PathBuf {
-    out.join("experiment.json")
-}
-
 /// Where the image of an item is.
 pub fn image_path(out: &Path, id: &str) -> PathBuf {
     out.join("images").join(format!("{id}.exr"))
+}
+
+/// The image of an item, which proves to be the one that was written: right id, and the digest of its pixels is the one
+/// written with it and, where `pixels` is known from a row, that one.
+///
+/// # Errors
+/// Kind `Input` where the file is missing, torn, or not what was written.
+pub fn read_image(out: &Path, id: &str, pixels: Option<&str>) -> Result<Image> {
+    let path = image_path(out, id);
+    let (image, provenance) = read_exr(&path)?;
+    let says = |name: &str| provenance.iter().find(|(n, _)| n == name).map_or("", |(_, value)| value.as_str());
+    let found = pixel_hash(&image.pixels);
+    for (what, expected, found) in [
+        ("the id", id, says("id")),
+        ("pixels with the digest", says("pixels"), &found),
+        ("pixels with the digest", pixels.unwrap_or(&found), &found),
+    ] {
+        if expected != found {
+            return Err(Error::input(path.display(), format!("expected {what} {expected}, found {found}")));
+        }
+    }
+    Ok(image)
+}
+
+/// What a row was made with, besides what it says of itself: together with that it is what the item's id hashes. A row
+/// that no longer fits says with it what has changed.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MadeWith {
+    /// Start of the digest of the scene's content; none for a point set.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene: Option<String>,
+    /// Algorithm number of the renderer.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub renderer: Option<u32>,
+    /// Algorithm number of the sampler.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sampler: Option<u32>,
+    /// Algorithm number of the light estimator.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub estimator: Option<u32>,
+    /// Algorithm number of the closed forms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exact: Option<u32>,
+}
+
+/// As many digits of a content hash as rows and messages show.
+pub fn short_hash(content_hash: &str) -> String {
+    content_hash.chars().take(ID_LENGTH).collect()
 }
 
 /// The sort of an item.
@@ -156,11 +201,14 @@ pub struct ImageRow {
     pub size: Size,
     /// Mean over all pixel-channels.
     pub mean: f64,
-    /// Digest of the pixels ([`pixel_hash`](super::identity::pixel_hash)): equal where two images are equal bit for bit.
+    /// Digest of the pixels ([`pixel_hash`]): equal where two images are equal bit for bit.
     pub pixels: String,
     /// What differs from the image that this one is another making of; absent where there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub twin: Option<TwinDifference>,
+    /// What it was made with; rows of earlier versions do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_with: Option<MadeWith>,
     /// Errors against the reference.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub errors: Option<ImageErrors>,
@@ -195,6 +243,9 @@ pub struct ReferenceRow {
     pub mean: f64,
     /// Digest of the pixels of the mean of the halves; for a closed form those of its image.
     pub pixels: String,
+    /// What it was made with; rows of earlier versions do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_with: Option<MadeWith>,
 }
 
 /// Kind `ensemble`: what the replicates of one sampler at one spp say together.
@@ -244,6 +295,9 @@ pub struct EnsembleRow {
     pub error_autocorrelation: Option<Estimate>,
     /// Ids of the replicates.
     pub members: Vec<String>,
+    /// What it was made with; rows of earlier versions do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_with: Option<MadeWith>,
 }
 
 /// Kind `points`.
@@ -270,6 +324,9 @@ pub struct PointsRow {
     pub metrics_algorithm: u32,
     /// Values by name; null where a metric is not defined for the set.
     pub metrics: PointMetrics,
+    /// What it was made with; rows of earlier versions do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_with: Option<MadeWith>,
 }
 
 /// One line of `results.jsonl`.
@@ -351,6 +408,37 @@ impl Row {
         }
     }
 
+    /// What the row was made with, where it says so.
+    pub fn made_with(&self) -> Option<&MadeWith> {
+        match self {
+            Self::Image(row) => row.made_with.as_ref(),
+            Self::Reference(row) => row.made_with.as_ref(),
+            Self::Ensemble(row) => row.made_with.as_ref(),
+            Self::Points(row) => row.made_with.as_ref(),
+        }
+    }
+
+    /// The scene's name; none for a point set.
+    pub fn scene(&self) -> Option<&str> {
+        match self {
+            Self::Image(row) => Some(&row.scene),
+            Self::Reference(row) => Some(&row.scene),
+            Self::Ensemble(row) => Some(&row.scene),
+            Self::Points(_) => None,
+        }
+    }
+
+    /// Writes down what the row was made with: its id vouches for it, and a row of an earlier version did not say.
+    pub(super) fn set_made_with(&mut self, made_with: &MadeWith) {
+        let field = match self {
+            Self::Image(row) => &mut row.made_with,
+            Self::Reference(row) => &mut row.made_with,
+            Self::Ensemble(row) => &mut row.made_with,
+            Self::Points(row) => &mut row.made_with,
+        };
+        *field = Some(made_with.clone());
+    }
+
     /// Writes down what the experiment calls the sampler now: an alias may have come or gone since the row was made.
     pub(super) fn set_names(&mut self, now: &[String]) {
         match self {
@@ -379,37 +467,6 @@ pub struct Timing {
     pub load: Option<f64>,
 }
 
-/// `experiment.json`: what a folder's rows are the results of. Free of anything from a clock.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct About {
-    /// Row format, [`SCHEMA`].
-    pub schema: u32,
-    /// Version of the program.
-    pub version: String,
-    /// The command that makes this folder.
-    pub command: String,
-    /// The experiment as it was read, defaults made explicit.
-    pub experiment: Experiment,
-    /// Its scenes.
-    pub scenes: Vec<SceneFacts>,
-    /// What the plan made of the experiment, in sentences.
-    pub notes: Vec<String>,
-    /// Sets of samplers that are not done in a scene, because another one means the same there.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub left_out: Vec<LeftOut>,
-}
-
-/// A set of samplers that means in one scene, for the decisions that the scene makes, the same as another one.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct LeftOut {
-    /// Scene name.
-    pub scene: String,
-    /// The set in canonical form.
-    pub sampler: String,
-    /// The one that is done, in canonical form.
-    pub same_as: String,
-}
-
 /// Reads `results.jsonl`: all whole rows, in the order of the file.
 ///
 /// # Errors
@@ -426,66 +483,9 @@ pub fn read_timings(path: &Path) -> Result<Vec<Timing>> {
     Ok(lines(path, parse_timing)?.0)
 }
 
-/// Reads `experiment.json`.
-///
-/// # Errors
-/// Kind `Input` where it is missing or does not read.
-pub fn read_about(path: &Path) -> Result<About> {
-    let bad = |e: &dyn std::fmt::Display| Error::input(path.display(), format!("expected what was run, found: {e}"));
-    serde_json::from_slice(&std::fs::read(path).map_err(|e| bad(&e))?).map_err(|e| bad(&e))
-}
-
 /// One line of `timings.jsonl`.
 pub(super) fn parse_timing(line: &str) -> std::result::Result<Timing, String> {
     serde_json::from_str(line).map_err(|e| format!("expected a timing, found: {e}"))
-}
-
-/// Reads a file of one JSON value a line; the flag says whether the file is exactly its whole lines.
-///
-/// A last line without an end that does not read was torn and is dropped; one that reads is whole but for its end.
-pub(super) fn lines<T>(path: &Path, parse: impl Fn(&str) -> std::result::Result<T, String>) -> Result<(Vec<T>, bool)> {
-    let bytes = std::fs::read(path)
-        .map_err(|e| Error::input(path.display(), format!("expected a file of results, found: {e}")))?;
-    let mut values = Vec::new();
-    for (number, bytes) in bytes.split_inclusive(|&byte| byte == b'\n').enumerate() {
-        let whole = bytes.ends_with(b"\n");
-        let value = std::str::from_utf8(bytes).map_err(|e| e.to_string()).and_then(|text| parse(text.trim_end()));
-        match value {
-            Ok(value) => values.push(value),
-            Err(_) if !whole => {}
-            Err(what) => return Err(Error::input(format!("{}:{}", path.display(), number + 1), what)),
-        }
-    }
-    Ok((values, bytes.is_empty() || bytes.ends_with(b"\n")))
-}
-
-/// As [`lines`], where a missing file is an empty one.
-pub(super) fn lines_if_any<T>(
-    path: &Path,
-    parse: impl Fn(&str) -> std::result::Result<T, String>,
-) -> Result<(Vec<T>, bool)> {
-    if path.exists() { lines(path, parse) } else { Ok((Vec::new(), true)) }
-}
-
-/// Writes a file of one JSON value a line, whole or not at all; not touched where it would not change.
-pub(super) fn write_lines<'a, T: Serialize + 'a>(path: &Path, values: impl Iterator<Item = &'a T>) -> Result<()> {
-    let mut text = String::new();
-    for value in values {
-        text.push_str(&line(value));
-        text.push('\n');
-    }
-    write_if_changed(path, text.as_bytes())
-}
-
-/// Writes `bytes` whole or not at all; a file that has them already keeps its time of change.
-pub(super) fn write_if_changed(path: &Path, bytes: &[u8]) -> Result<()> {
-    if std::fs::read(path).is_ok_and(|old| old == bytes) { Ok(()) } else { write_whole(path, bytes) }
-}
-
-/// One value as one line of JSON.
-pub(super) fn line(value: &impl Serialize) -> String {
-    // Rows are plain structs with text keys: nothing in them can fail to serialise.
-    serde_json::to_string(value).expect("a row serialises")
 }
 
 /// Seeds as decimal texts.
@@ -521,6 +521,7 @@ mod tests {
             mean: 0.25,
             pixels: "ffff".to_owned(),
             twin: None,
+            made_with: None,
             errors: Some(ImageErrors {
                 reference_id: "fedcba9876543210".to_owned(),
                 metrics_algorithm: 1,

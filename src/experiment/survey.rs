@@ -2,10 +2,12 @@
 
 use std::collections::{HashMap, HashSet};
 use std::fmt;
+use std::ops::Range;
 use std::path::Path;
 
 use super::backend::Size;
 use super::images;
+use super::lines::lines_if_any;
 use super::plan::{Plan, Work, WorkItem};
 use super::results::{self, Kind, Row, Timing};
 use crate::error::{Error, Result};
@@ -13,8 +15,11 @@ use crate::error::{Error, Result};
 /// Samples per second and thread that are expected where nothing was timed yet.
 pub const STATED_RATE: f64 = 2e6;
 
+/// Pairs of points that are looked at in the time of one sample.
+pub(super) const PAIRS_A_SAMPLE: u32 = 100;
+
 /// Pairs of points per second for point-set metrics.
-const PAIR_RATE: f64 = 2e8;
+const PAIR_RATE: f64 = STATED_RATE * PAIRS_A_SAMPLE as f64;
 
 /// Bytes that the program takes before it opens anything: code, threads, rows.
 const PROGRAM_BYTES: u64 = 32 << 20;
@@ -66,8 +71,8 @@ impl Standing {
     /// # Errors
     /// Kind `Input` where a line other than a torn last one does not read.
     pub fn read(plan: &Plan, out: &Path) -> Result<Self> {
-        let (in_file, rows_clean) = results::lines_if_any(&results::results_path(out), Row::parse)?;
-        let (timings, timings_clean) = results::lines_if_any(&results::timings_path(out), results::parse_timing)?;
+        let (in_file, rows_clean) = lines_if_any(&results::results_path(out), Row::parse)?;
+        let (timings, timings_clean) = lines_if_any(&results::timings_path(out), results::parse_timing)?;
         let rows: HashMap<String, Row> = in_file.iter().map(|row| (row.id().to_owned(), row.clone())).collect();
         let states = plan.items.iter().map(|item| state(item, rows.get(&item.id), out)).collect();
         let timings = timings.into_iter().map(|timing| (timing.id.clone(), timing)).collect();
@@ -87,7 +92,7 @@ fn state(item: &WorkItem, row: Option<&Row>, out: &Path) -> State {
 }
 
 /// Whether a row holds what the item would find: the id vouches for the pixels, the rest is compared here.
-fn is_result_of(row: &Row, item: &WorkItem) -> bool {
+pub(super) fn is_result_of(row: &Row, item: &WorkItem) -> bool {
     let metrics = item.metrics_algorithm;
     match (row, &item.work) {
         (Row::Image(row), Work::Image(work)) => {
@@ -109,7 +114,7 @@ fn is_result_of(row: &Row, item: &WorkItem) -> bool {
 pub struct Survey {
     /// Items by kind: all, and those left.
     pub items: Vec<(Kind, usize, usize)>,
-    /// Samples of the whole plan.
+    /// Samples of all these items.
     pub samples: u64,
     /// Samples left to render.
     pub samples_left: u64,
@@ -128,15 +133,19 @@ pub struct Survey {
 impl Survey {
     /// Surveys a plan; `threads` will work on it.
     pub fn new(plan: &Plan, standing: &Standing, out: &Path, threads: usize) -> Self {
-        let left: Vec<usize> =
-            (0..plan.items.len()).filter(|&position| standing.states[position] != State::Done).collect();
+        Self::of_part(plan, standing, out, threads, 0..plan.items.len())
+    }
+
+    /// Surveys the items at `part` of a plan. Memory and disk are those of the whole, which no part exceeds.
+    pub fn of_part(plan: &Plan, standing: &Standing, out: &Path, threads: usize, part: Range<usize>) -> Self {
+        let left: Vec<usize> = part.clone().filter(|&position| standing.states[position] != State::Done).collect();
         let samples_left = samples_left(plan, standing, out, &left);
         let (rate, is_rate_measured) = rate(standing, threads);
         let pairs: u64 = left.iter().map(|&position| plan.items[position].pairs()).sum();
         let kept: Vec<Size> = plan.items.iter().filter_map(WorkItem::kept_image).collect();
         Self {
-            items: count_kinds(plan, &left),
-            samples: plan.items.iter().map(WorkItem::samples).sum(),
+            items: count_kinds(plan, part.clone(), &left),
+            samples: plan.items[part].iter().map(WorkItem::samples).sum(),
             samples_left,
             rate,
             is_rate_measured,
@@ -183,10 +192,11 @@ impl Default for Limits {
 }
 
 /// Items by kind, in the order in which kinds first occur.
-fn count_kinds(plan: &Plan, left: &[usize]) -> Vec<(Kind, usize, usize)> {
+fn count_kinds(plan: &Plan, part: Range<usize>, left: &[usize]) -> Vec<(Kind, usize, usize)> {
     let left: HashSet<usize> = left.iter().copied().collect();
     let mut counts: Vec<(Kind, usize, usize)> = Vec::new();
-    for (position, item) in plan.items.iter().enumerate() {
+    for position in part {
+        let item = &plan.items[position];
         let missing = usize::from(left.contains(&position));
         match counts.iter_mut().find(|(kind, ..)| *kind == item.kind()) {
             Some((_, all, of_them)) => {

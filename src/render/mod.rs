@@ -6,7 +6,7 @@ mod direct;
 mod tiles;
 
 pub use direct::{Contribution, light_contribution};
-pub use tiles::{NonFinite, Rendered, render, render_observed, render_sample};
+pub use tiles::{NonFinite, Rendered, render, render_observed, render_sample, render_while};
 
 use crate::accel;
 

@@ -1,5 +1,7 @@
 //! Pixels over threads: spans of consecutive samples fill packets of rays; each tile writes only its own pixels.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -62,19 +64,43 @@ pub fn render_observed<S: PointSource>(
     source: &S,
     finished: &(dyn Fn(u64) + Sync),
 ) -> Result<Rendered, NonFinite> {
+    let go_on = |samples| {
+        finished(samples);
+        true
+    };
+    render_while(scene, source, &go_on).map(|rendered| rendered.expect("nobody stops it"))
+}
+
+/// As [`render`], asking `go_on` after each tile, with the number of samples done in it, whether to go on. Once the answer
+/// is no, no other tile begins and there is no image: `None`.
+///
+/// # Errors
+/// As [`render`].
+pub fn render_while<S: PointSource>(
+    scene: &Scene,
+    source: &S,
+    go_on: &(dyn Fn(u64) -> bool + Sync),
+) -> Result<Option<Rendered>, NonFinite> {
+    let stopped = AtomicBool::new(false);
     let (width, height) = scene.camera.size();
     let (columns, rows) = (width.div_ceil(TILE), height.div_ceil(TILE));
-    let tiles: Vec<Result<TileResult, NonFinite>> = (0..columns * rows)
+    let tiles: Option<Vec<Result<TileResult, NonFinite>>> = (0..columns * rows)
         .into_par_iter()
         .map_init(Lanes::default, |lanes, t| {
+            if stopped.load(Ordering::Relaxed) {
+                return None;
+            }
             let (x0, y0) = ((t % columns) * TILE, (t / columns) * TILE);
             let pixels: Vec<(u32, u32)> =
                 (y0..(y0 + TILE).min(height)).flat_map(|y| (x0..(x0 + TILE).min(width)).map(move |x| (x, y))).collect();
             let tile = render_pixels(scene, source, &pixels, lanes);
-            finished(pixels.len() as u64 * u64::from(source.samples()));
-            tile
+            if !go_on(pixels.len() as u64 * u64::from(source.samples())) {
+                stopped.store(true, Ordering::Relaxed);
+            }
+            Some(tile)
         })
         .collect();
+    let Some(tiles) = tiles else { return Ok(None) };
     let mut image = Image::black(width, height);
     let mut rays = 0;
     let mut first_bad: Option<NonFinite> = None;
@@ -94,7 +120,7 @@ pub fn render_observed<S: PointSource>(
             }
         }
     }
-    first_bad.map_or(Ok(Rendered { image, rays }), Err)
+    first_bad.map_or(Ok(Some(Rendered { image, rays })), Err)
 }
 
 /// Traces one sample alone: what [`render`] adds to pixel (x, y) for `index`.

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use crate::error::{Error, Result};
-use crate::experiment::results::image_path;
-use crate::film::{Image, read_exr, to_screen};
+use crate::experiment::results::read_image;
+use crate::film::{Image, to_screen};
 
 use super::figure::Rgb8;
 use super::numbers::{short, signed};
@@ -19,7 +19,7 @@ const ZOOM: u32 = 4;
 
 /// Reads an image; one that is not there is an error like any other.
 fn image(dir: &Path, id: &str) -> Result<Image> {
-    Ok(read_exr(&image_path(dir, id))?.0)
+    read_image(dir, id, None)
 }
 
 /// As shown on a screen.

@@ -539,6 +539,11 @@ impl<'a> Index<'a> {
             let what = format!("{missing} of {of} comparisons of a sampler with its reference (the first: {first})");
             summary.missing.push(what);
         }
+        let members = self.ensembles.values().flat_map(|row| &row.members);
+        let lost = members.filter(|id| !self.images.contains_key(id.as_str())).count();
+        if lost > 0 {
+            summary.missing.push(format!("{lost} rows of single replicates"));
+        }
     }
 
     fn cell(&self, row: &EnsembleRow, scene: usize, sampler: usize, s: &SceneSummary, p: &SamplerSummary) -> Cell {

@@ -83,7 +83,9 @@ fn details_path(dir: &Path) -> PathBuf {
 /// be written.
 pub fn write(dir: &Path) -> Result<Written> {
     let about = read_about(&about_path(dir))?;
-    let rows = read(&results_path(dir))?;
+    let mut rows = read(&results_path(dir))?;
+    // A kill between two files may leave rows of an edited scene: they are not what this report is about.
+    rows.retain(|row| about.fits(row));
     let timings = if timings_path(dir).exists() { read_timings(&timings_path(dir))? } else { Vec::new() };
     let summary = summarise(&rows, &timings, &about);
     let figures = draw(dir, &summary)?;

@@ -123,6 +123,15 @@ impl SampleLayout {
         claim
     }
 
+    /// The layout that prints as `text`; `None` where none does.
+    pub fn parse(text: &str) -> Option<Self> {
+        let mut layout = Self::default();
+        for decision in Decision::named_in(text) {
+            layout.claim(decision, decision.dimensions());
+        }
+        (layout.to_string() == text).then_some(layout)
+    }
+
     /// All claims in order.
     pub fn claims(&self) -> &[Claim] {
         &self.claims
@@ -171,6 +180,10 @@ mod tests {
         assert_eq!(named, [Decision::Pixel, Decision::LightPick, Decision::LightPoint]);
         assert!(layout.claims().iter().all(|claim| claim.count == claim.decision.dimensions()));
         assert_eq!(Decision::named_in(&SampleLayout::default().to_string()), []);
+        for layout in [SampleLayout::default(), layout] {
+            assert_eq!(SampleLayout::parse(&layout.to_string()), Some(layout));
+        }
+        assert_eq!(SampleLayout::parse("pixel 0–1, lens 2–3, 5 dimensions in all"), None);
     }
 
     #[test]
