@@ -164,6 +164,7 @@ impl Backend for Lab {
             layout: full.layout.to_string(),
             exact_reference: exact::closed_form(&loaded, size).is_some(),
             lens: full.focal_depth().is_some(),
+            exposure: framebuffer.exposure,
             memory_bytes: SCENE_COPIES * full.bytes() as u64,
         };
         let layout = full.layout.clone();

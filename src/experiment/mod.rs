@@ -18,6 +18,7 @@ mod images;
 pub mod lab;
 mod machine;
 mod measure;
+mod pictures;
 pub mod plan;
 pub mod progress;
 pub mod results;
