@@ -179,7 +179,10 @@ fn strips(folder: &Path) -> Result<()> {
             .iter()
             .zip(FAMILIES)
             .enumerate()
-            .map(|(i, (image, name))| StripCell { image, title: format!("{name}:best"), captions: captions(i) })
+            .map(|(i, (image, name))| StripCell {
+                captions: captions(i),
+                ..StripCell::new(image, &format!("{name}:best"))
+            })
             .collect();
         let crops = if scale_bar.is_some() { Vec::new() } else { crops.clone() };
         strip(&cells, &StripLayout { columns: 5, whole: Some(2), crops, scale_bar })?.write(&folder.join(name))

@@ -81,6 +81,7 @@ impl Backend for Toy {
             layout: "pixel 0-1".to_owned(),
             exact_reference: name == "exact",
             lens: name == "ramp",
+            exposure: 3.0,
             memory_bytes: 1000,
         })
     }

@@ -5,7 +5,12 @@
 
 use std::path::{Path, PathBuf};
 
-use sampler_lab::experiment::results::{EnsembleRow, Row, Timing, read, read_about, read_timings};
+use sampler_lab::experiment::execute::{Options, execute};
+use sampler_lab::experiment::lab::Lab;
+use sampler_lab::experiment::plan::plan;
+use sampler_lab::experiment::progress::Silent;
+use sampler_lab::experiment::results::{EnsembleRow, Row, Timing, read, read_about, read_timings, timings_path};
+use sampler_lab::experiment::spec::Experiment;
 use sampler_lab::report::{Figures, Summary, summarise, text, write};
 use sampler_lab::stats::Estimate;
 
@@ -137,10 +142,10 @@ fn a_wrong_limit_a_stall_and_a_falling_error_have_words_of_their_own() {
     assert!(stalled.contains("**`ld:sheet` stalls in `a01`**"), "{stalled}");
     assert!(stalled.contains("| `ld:sheet` | no bias seen, but it stalls ("));
     let falling = edited(ld, |row| set(row, 1e-1 / f64::from(row.spp.asked), estimate(1e-6, 1e-5)));
-    assert!(falling.contains("- `ld:sheet` in `a01`: the error falls to 0.250 "), "{falling}");
+    assert!(falling.contains("| `a01` | `ld:sheet` | error falls, no bias seen | 0.250 "), "{falling}");
     assert!(falling.contains("| `ld:sheet` | yes ("));
     for (report, right) in [(&wrong, 0), (&stalled, 1), (&falling, 2)] {
-        let found = ["`ld:sheet` converges to", "`ld:sheet` stalls", "`ld:sheet` in `a01`: the error falls"];
+        let found = ["`ld:sheet` converges to", "`ld:sheet` stalls", "`ld:sheet` | error falls"];
         let found: Vec<usize> = (0..3).filter(|&i| report.contains(found[i])).collect();
         assert_eq!(found, [right]);
     }
@@ -155,7 +160,7 @@ fn an_interval_that_holds_both_answers_says_cannot_tell() {
             row.bias2 = estimate(5e-3, 4e-3);
         },
     );
-    assert!(report.contains("cannot tell where it goes; perhaps a bias: bias²"), "{report}");
+    assert!(report.contains("| `a01` | `ld:sheet` | cannot tell | "), "{report}");
     assert!(report.contains("| `ld:sheet` | cannot tell ("));
 }
 
@@ -163,10 +168,11 @@ fn an_interval_that_holds_both_answers_says_cannot_tell() {
 fn a_cure_that_does_not_cure_is_not_called_one() {
     let is_literal = |sampler: &str, spp: u32| sampler == "ld:sheet" && spp == 64;
     let worse = edited(is_literal, |row| set(row, 1e-9, estimate(0.0, 1e-10)));
-    assert!(worse.contains("`ld:best` is no cure here"), "{worse}");
+    assert!(worse.contains("| kept apart is no cure |"), "{worse}");
     let below_noise = edited(is_literal, |row| set(row, -1e-9, estimate(0.0, 1e-10)));
     assert!(
-        below_noise.contains("so its course cannot be told. How `ld:best` compares cannot be told"),
+        below_noise.contains("| `ld:sheet` | cannot tell: not above the reference's noise | – |")
+            && below_noise.contains("| `ld:best` | – | cannot tell |"),
         "{below_noise}"
     );
     assert!(!below_noise.contains("not a number"));
@@ -225,13 +231,13 @@ fn pictures_without_images_are_said_to_be_missing_and_an_earlier_figure_is_kept(
     let report = |folder: &tempfile::TempDir| std::fs::read_to_string(write(folder.path()).unwrap().report).unwrap();
     let text = report(&folder);
     assert!(text.contains("Missing: 4 of 5 pictures; 4 of 4 stages of Figure 1"), "{text}");
-    assert!(text.contains("*Not shown: errors."));
-    std::fs::write(folder.path().join("figures/errors.png"), b"an earlier figure").unwrap();
+    assert!(text.contains("*Not shown: errors-a01."));
+    std::fs::write(folder.path().join("figures/errors-a01.png"), b"an earlier figure").unwrap();
     assert!(
-        report(&folder).contains("](figures/errors.png)"),
+        report(&folder).contains("](figures/errors-a01.png)"),
         "the earlier figure is shown, and the text is that of its run"
     );
-    assert_eq!(std::fs::read(folder.path().join("figures/errors.png")).unwrap(), b"an earlier figure");
+    assert_eq!(std::fs::read(folder.path().join("figures/errors-a01.png")).unwrap(), b"an earlier figure");
 }
 
 #[test]
@@ -240,16 +246,16 @@ fn neighbours_that_err_alike_are_told_from_those_that_do_not() {
     let rho = |value: f64| Some(Estimate::without_interval(value));
     let alike = edited(fixed, |row| row.error_autocorrelation = rho(0.9));
     assert!(
-        alike.contains("**In `a01` neighbours err more alike under `halton:sheet`**: ρ = +0.90 (no interval)"),
+        alike.contains("**Neighbours err more alike** under `halton:sheet` in `a01` (ρ = +0.90 (no interval))"),
         "{alike}"
     );
-    assert!(alike.contains("- `halton:sheet` in `a01`: structure instead of noise"));
+    assert!(alike.contains("| structure instead of noise | `halton:sheet` | `a01` |"));
     let not = edited(fixed, |row| row.error_autocorrelation = rho(0.0));
-    assert!(not.contains("Whether neighbours err more alike in `a01` under `halton:sheet` cannot be told"), "{not}");
-    assert!(!not.contains("structure instead of noise"));
+    assert!(not.contains("It cannot be told for `halton:sheet` in `a01`"), "{not}");
+    assert!(!not.contains("| structure instead of noise"));
     let less = edited(fixed, |row| row.error_autocorrelation = rho(-0.9));
     assert!(
-        less.contains("In `a01` neighbours err less alike under `halton:sheet` than under `halton:best`"),
+        less.contains("They err less alike than under the sampler compared with for `halton:sheet` in `a01`"),
         "{less}"
     );
 }
@@ -288,7 +294,6 @@ fn an_experiment_without_a_lens_says_nothing_of_one() {
     about.scenes[0].lens = false;
     let report = text(&summarise(&rows(), &timings(), &about), &Figures::default());
     assert!(report.contains("No scene of this experiment has a lens"));
-    assert!(!report.contains("(with a lens)"));
 }
 
 /// The anchor of a heading as GitHub makes it, written anew from its rule: lower case; letters, digits, `_`, `-` and
@@ -347,6 +352,9 @@ fn check_links(report: &Path) {
 fn every_link_image_and_number_of_a_report_resolves() {
     let folder = folder();
     check_links(&write(folder.path()).unwrap().report);
+    for entry in std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("reports")).unwrap() {
+        check_links(&entry.unwrap().path().join("report.md"));
+    }
 }
 
 #[test]
@@ -354,7 +362,96 @@ fn every_heading_of_a_report_is_in_its_table_of_contents() {
     let page = text(&summary(&rows()), &Figures::default());
     let heading = |line: &&str| line.starts_with("## ") || line.starts_with("### ");
     let headings: Vec<&str> = page.lines().filter(heading).map(|line| line.trim_start_matches(['#', ' '])).collect();
-    let (before, _) = page.split_once("\n## ").unwrap();
-    let listed = before.lines().filter_map(|line| line.trim_start().strip_prefix("- [")?.split("](#").next());
-    assert!(listed.eq(headings), "{before}");
+    let (_, after) = page.split_once("**Contents**\n\n").unwrap();
+    let (list, _) = after.split_once("\n\n").unwrap();
+    let listed = list.lines().filter_map(|line| line.trim_start().strip_prefix("- [")?.split("](#").next());
+    assert!(listed.eq(headings), "{list}");
+}
+
+/// Two picture scenes with a ladder of counts, none with a lens; images large enough for details.
+const PICTURED: &str = r#"{
+    "name": "pictured", "seed": 5, "scenes": ["cornell", "penumbra"], "size": "4x4",
+    "samplers": ["uniform", "ld:best"], "spp": [1, 4], "replicates": 2,
+    "reference": {"sampler": "sobol", "spp": 4},
+    "pictures": [
+        {"scene": "cornell", "size": "88x30", "spp": [1, 2, 4], "reference_spp": 8},
+        {"scene": "penumbra", "size": "88x30", "spp": [1, 2, 4]}
+    ]
+}"#;
+
+/// Runs it and sets the seconds of each picture to its samples per pixel, ld:best twice as fast.
+fn pictured() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let place = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/experiments/pictured.json");
+    let value = sampler_lab::scene::json::parse(PICTURED.as_bytes(), "pictured.json").unwrap();
+    let experiment = Experiment::from_value(&value, "pictured.json").unwrap();
+    let lab = Lab::new(&place, Default::default());
+    let plan = plan(&experiment, &lab).unwrap();
+    let outcome =
+        execute(&plan, &lab, folder.path(), &Silent, &Options::new(2, "sampler-lab run pictured.json")).unwrap();
+    assert_eq!(outcome.failures, []);
+    let rows = read(&folder.path().join("results.jsonl")).unwrap();
+    let timings: Vec<String> = read_timings(&timings_path(folder.path()))
+        .unwrap()
+        .into_iter()
+        .map(|mut timing| {
+            if let Some(Row::Image(row)) = rows.iter().find(|row| row.id() == timing.id) {
+                let speed = if row.sampler.starts_with("ld") { 2.0 } else { 1.0 };
+                timing.seconds = f64::from(row.spp.taken) / speed;
+            }
+            serde_json::to_string(&timing).unwrap() + "\n"
+        })
+        .collect();
+    std::fs::write(timings_path(folder.path()), timings.concat()).unwrap();
+    folder
+}
+
+#[test]
+fn every_picture_scene_has_its_strips_and_equal_time_takes_the_count_that_costs_as_much() {
+    let folder = pictured();
+    let written = write(folder.path()).unwrap();
+    assert!(written.check().is_ok(), "{:?}", written.summary.missing);
+    check_links(&written.report);
+    let page = std::fs::read_to_string(&written.report).unwrap();
+    for scene in ["cornell", "penumbra"] {
+        assert!(page.contains(&format!("### Pictures of {scene}\n")));
+        for sort in ["reference", "details", "equal-time", "errors"] {
+            let file = format!("figures/{sort}-{scene}.png");
+            assert!(page.contains(&format!("]({file})")) && folder.path().join(&file).is_file(), "{file}");
+        }
+        assert!(folder.path().join(format!("images/flip/{scene}/02-ld-best.png")).is_file());
+    }
+    let words = |scene: &str| -> Vec<String> {
+        written.figures.details[scene].iter().map(|name| name.split(' ').next().unwrap().to_owned()).collect()
+    };
+    assert_eq!(words("cornell"), ["edges", "shadow"], "no lens, so no defocus");
+    assert_eq!(words("penumbra"), ["shadow"], "one plane of one colour: no edges either");
+    assert!(page.contains("is what `uniform:best` takes at 2 spp, 2.00 s"), "{page}");
+    let (_, table) = page.split_once("The pictures of `cornell` at equal time").unwrap();
+    let lines: Vec<&str> = table.lines().filter(|line| line.starts_with("| `")).take(2).collect();
+    assert!(lines[0].starts_with("| `uniform:best` | 2 | 2.00 | 1.00 |"), "{lines:?}");
+    assert!(lines[1].starts_with("| `ld:best` | 4 | 2.00 | 1.00 |"), "{lines:?}");
+    assert!(page.contains("`cornell` in three stages"), "a scene without a lens has no stage for it");
+    // Without the images the figures stay, and so do the words.
+    std::fs::remove_dir_all(folder.path().join("images")).unwrap();
+    write(folder.path()).unwrap();
+    assert_eq!(std::fs::read_to_string(&written.report).unwrap(), page);
+}
+
+#[test]
+fn a_picture_is_shown_at_its_scene_s_own_exposure() {
+    let folder = pictured();
+    let sets = write(folder.path()).unwrap().summary.pictured;
+    assert_eq!((sets[0].exposure, sets[1].exposure), (1.0, 3.0), "what cornell.json and penumbra.json ask for");
+    let figure = |name: &str| std::fs::read(folder.path().join("figures").join(name)).unwrap();
+    let (cornell, errors) = (figure("reference-cornell.png"), figure("errors-cornell.png"));
+    let about = folder.path().join("experiment.json");
+    let text = std::fs::read_to_string(&about).unwrap();
+    let edited = text.replacen("\"exposure\": 1.0", "\"exposure\": 1.5", 1);
+    assert_ne!(text, edited);
+    std::fs::write(&about, edited).unwrap();
+    let page = std::fs::read_to_string(write(folder.path()).unwrap().report).unwrap();
+    assert!(page.contains("88x30 pixels, exposure 1.5"), "{page}");
+    assert!(figure("reference-cornell.png") != cornell);
+    assert!(figure("errors-cornell.png") == errors, "an error map has no exposure");
 }

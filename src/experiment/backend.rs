@@ -113,7 +113,7 @@ pub(super) mod stage_word {
 }
 
 /// What a plan needs to know of a scene.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SceneFacts {
     /// Short name: the config file's, without folder and ending.
     pub name: String,
@@ -129,6 +129,9 @@ pub struct SceneFacts {
     pub exact_reference: bool,
     /// Whether there is a lens to sample.
     pub lens: bool,
+    /// Exposure that the scene file asks for, in pictures to look at alone.
+    #[serde(default = "default_exposure")]
+    pub exposure: f32,
     /// Bytes held while the scene is open.
     pub memory_bytes: u64,
 }
@@ -143,6 +146,11 @@ impl SceneFacts {
     pub fn decisions(&self) -> Vec<Decision> {
         Decision::named_in(&self.layout)
     }
+}
+
+/// The scene format's own, for records made before it was written down.
+fn default_exposure() -> f32 {
+    3.0
 }
 
 /// Numbers that stand for the code behind an item: each is raised when, and only when, that code's bits change.

@@ -151,6 +151,7 @@ impl Lab {
             layout: full.layout.to_string(),
             exact_reference: exact::closed_form(&loaded, size).is_some(),
             lens: full.focal_depth().is_some(),
+            exposure: framebuffer.exposure,
             memory_bytes: SCENE_COPIES * full.bytes() as u64,
         };
         self.layouts.borrow_mut().insert(name.clone(), full.layout.clone());

@@ -24,6 +24,7 @@ mod lines;
 mod machine;
 mod measure;
 pub mod merge;
+mod pictures;
 pub mod plan;
 pub mod progress;
 pub mod results;

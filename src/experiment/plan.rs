@@ -367,7 +367,7 @@ pub fn plan(experiment: &Experiment, backend: &dyn Backend) -> Result<Plan> {
         let probed = if is_probed { probed.as_slice() } else { &[] };
         planner.add_statistics(scene, experiment.size.of(name, scene.size), &samplers, probed);
     }
-    if let Some(pictures) = &experiment.pictures {
+    for pictures in &experiment.pictures {
         for (_, scene) in experiment.scenes.iter().zip(&scenes).filter(|(name, _)| **name == pictures.scene) {
             planner.add_pictures(scene, pictures, &samplers);
         }
@@ -719,18 +719,19 @@ impl Planner<'_> {
         self.add_image(scene, work)
     }
 
-    /// The pictures: a reference of their own, one image of each sampler, and the stages of the sheet's Figure 1.
+    /// The pictures: a reference of their own, one image of each sampler and count, and the stages of the sheet's Figure 1.
     fn add_pictures(&mut self, scene: &SceneFacts, pictures: &Pictures, samplers: &[PlannedSampler]) {
         self.is_shown = true;
         let reference_id = self.add_reference(scene, pictures.size, pictures.reference_spp, "picture reference");
-        for sampler in self.done_in(scene, samplers) {
+        let compared = self.done_in(scene, samplers);
+        for (sampler, &asked) in compared.iter().flat_map(|s| pictures.spp.iter().map(move |spp| (s, spp))) {
             let work = ImageWork {
                 kind: Kind::Picture,
                 scene: scene.name.clone(),
                 sampler: sampler.canonical.clone(),
-                spp: self.count(&sampler.canonical, Some(scene), pictures.spp),
+                spp: self.count(&sampler.canonical, Some(scene), asked),
                 replicate: 0,
-                seed: self.seed("picture", &scene.name, &sampler.canonical, pictures.spp, 0),
+                seed: self.seed("picture", &scene.name, &sampler.canonical, asked, 0),
                 size: pictures.size,
                 estimator: self.experiment.estimator.primary(),
                 stage: Stage::Final,

@@ -15,7 +15,7 @@
 //! | `reference` | `{"sampler", "spp"}`: two independent halves of `spp` samples per pixel, by a randomised sampler that is not compared |
 //! | `estimator` | optional: `"unbiased"` (the default), `"sheet"`, or `"both"`: unbiased, and where a light is picked among several by the sheet's shortcut too; references are always unbiased |
 //! | `points` | optional: `{"n", "metrics", "replicates"}`: point-set metrics of the same samplers |
-//! | `pictures` | optional: `{"scene", "size", "spp", "reference_spp"}`: images to look at; `reference_spp` defaults to the reference's |
+//! | `pictures` | optional: `{"scene", "size", "spp", "reference_spp"}`, or a list of these: images to look at; `spp` is a count or a ladder of counts, `reference_spp` defaults to the reference's |
 //! | `stability` | optional: `{"spp", "scenes", "samplers"}`: a sample more or less, the spread of replicates, other units of length, two passes, all against `spp` samples per pixel; `scenes` and `samplers` default to all of the experiment |
 
 use std::collections::{BTreeMap, HashSet};
@@ -26,6 +26,8 @@ use serde::{Deserialize, Serialize};
 use super::backend::{Estimator, Size, Variant};
 pub use super::entry::SamplerEntry;
 use super::entry::sampler;
+pub use super::pictures::Pictures;
+use super::pictures::{one_or_more, pictures};
 use crate::error::{Error, Result};
 use crate::scene::json::{self, Item, Value, suggestion};
 
@@ -62,7 +64,8 @@ pub struct Experiment {
     /// Point-set metrics.
     pub points: Option<Points>,
     /// Images to look at.
-    pub pictures: Option<Pictures>,
+    #[serde(with = "one_or_more")]
+    pub pictures: Vec<Pictures>,
     /// What should make no difference, made to see whether it does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stability: Option<Stability>,
@@ -109,19 +112,6 @@ pub struct Points {
     pub metrics: Vec<String>,
     /// Independent randomisations of each set; 1 is used where nothing is random.
     pub replicates: u32,
-}
-
-/// Larger images, one of each sampler.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Pictures {
-    /// Scene, one of the experiment's.
-    pub scene: String,
-    /// Image size.
-    pub size: Size,
-    /// Samples per pixel.
-    pub spp: u32,
-    /// Samples per pixel of each half of the pictures' own reference.
-    pub reference_spp: u32,
 }
 
 /// Which light estimators the compared images are made with.
@@ -213,7 +203,7 @@ impl Experiment {
         let estimators = [("unbiased", Estimators::Unbiased), ("sheet", Estimators::Sheet), ("both", Estimators::Both)];
         let estimator = fields.or("estimator", Estimators::Unbiased, |item| item.choice(&estimators))?;
         let points = fields.opt("points", |item| points(&item))?;
-        let pictures = fields.opt("pictures", |item| pictures(&item, &scenes, reference.spp))?;
+        let pictures = fields.or("pictures", Vec::new(), |item| pictures(&item, &scenes, reference.spp))?;
         let stability = fields.opt("stability", |item| stability(&item, &scenes, &samplers))?;
         fields.finish()?;
         Ok(Self {
@@ -293,18 +283,18 @@ fn samplers(item: &Item) -> Result<Vec<SamplerEntry>> {
 }
 
 /// A number of things, at least 1.
-fn count(item: &Item, most: u32) -> Result<u32> {
+pub(super) fn count(item: &Item, most: u32) -> Result<u32> {
     // `integer` keeps to the range, so nothing is cut off.
     item.integer(1..=u64::from(most)).map(|n| n as u32)
 }
 
 /// A list of numbers of things.
-fn counts(item: &Item, most: u32) -> Result<Vec<u32>> {
+pub(super) fn counts(item: &Item, most: u32) -> Result<Vec<u32>> {
     list(item, "whole numbers", |item| count(item, most))
 }
 
 /// `"WxH"`.
-fn size(item: &Item) -> Result<Size> {
+pub(super) fn size(item: &Item) -> Result<Size> {
     let text = item.text("a size such as \"320x180\"")?;
     Size::parse(text).map_err(|what| Error::input(&item.place, what))
 }
@@ -326,7 +316,7 @@ fn sizes(item: &Item, scenes: &[String]) -> Result<Sizes> {
 }
 
 /// A scene has to be one of the experiment's.
-fn known_scene(scene: &str, scenes: &[String], item: &Item) -> Result<()> {
+pub(super) fn known_scene(scene: &str, scenes: &[String], item: &Item) -> Result<()> {
     if scenes.iter().any(|known| known == scene) {
         return Ok(());
     }
@@ -351,21 +341,6 @@ fn points(item: &Item) -> Result<Points> {
     let replicates = fields.need("replicates", |item| count(&item, MOST_REPLICATES))?;
     fields.finish()?;
     Ok(Points { n, metrics, replicates })
-}
-
-/// `pictures`.
-fn pictures(item: &Item, scenes: &[String], reference_spp: u32) -> Result<Pictures> {
-    let mut fields = item.fields()?;
-    let scene = fields.need("scene", |item| {
-        let scene = item.text("a scene of the experiment")?;
-        known_scene(scene, scenes, &item)?;
-        Ok(scene.to_owned())
-    })?;
-    let size = fields.need("size", |item| size(&item))?;
-    let spp = fields.need("spp", |item| count(&item, MOST_SPP))?;
-    let reference_spp = fields.or("reference_spp", reference_spp, |item| count(&item, MOST_SPP))?;
-    fields.finish()?;
-    Ok(Pictures { scene, size, spp, reference_spp })
 }
 
 /// `stability`. Whether its samplers are among the experiment's is a question of what they mean, so the plan asks it.
@@ -408,7 +383,7 @@ mod tests {
         let experiment = read(SMALL).unwrap();
         assert_eq!(experiment.seed, u64::MAX);
         assert_eq!(experiment.estimator, Estimators::Unbiased);
-        assert_eq!(experiment.pictures.as_ref().unwrap().reference_spp, 64);
+        assert_eq!(experiment.pictures[0].reference_spp, 64);
         let own = Size { width: 9, height: 9 };
         assert_eq!(experiment.size.of("box", own), Size { width: 6, height: 4 });
         assert_eq!(experiment.size.of("pots", own), own);

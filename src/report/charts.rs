@@ -242,10 +242,10 @@ pub fn which_decision(summary: &Summary) -> Option<Figure> {
     Some(share_chart(&frame(summary, "Which decision matters", &subtitle, axes), &panels, columns.len()))
 }
 
-/// What the speed chart of a scene is called in `figures/`: letters, digits and `.-_` alone, so that every viewer finds it.
-pub fn speed_name(scene: &str) -> String {
+/// What a figure of one scene is called in `figures/`: `sort-scene`, letters, digits and `.-_` alone, so that every viewer finds it.
+pub fn of_scene(sort: &str, scene: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || ".-_".contains(c) { c } else { '-' };
-    format!("speed-{}", scene.chars().map(plain).collect::<String>())
+    format!("{sort}-{}", scene.chars().map(plain).collect::<String>())
 }
 
 /// Seconds against RMSE of one scene; `None` where nothing was timed.

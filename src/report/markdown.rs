@@ -48,7 +48,7 @@ impl Page {
         format!("{}\n", self.resolved(&text).trim_end())
     }
 
-    /// The table of contents goes here: the headings of levels 2 and 3 that follow on the page.
+    /// The table of contents goes here: all headings of levels 2 and 3 of the page, before and after this place.
     pub fn contents(&mut self) {
         self.contents_at = Some(self.text.len());
     }
@@ -57,7 +57,7 @@ impl Page {
         let listed = self.headings.iter().filter(|(level, ..)| (2..=3).contains(level));
         let lines: Vec<String> =
             listed.map(|(level, words, anchor)| format!("{}- [{words}](#{anchor})", "  ".repeat(level - 2))).collect();
-        if lines.is_empty() { String::new() } else { format!("{}\n\n", lines.join("\n")) }
+        if lines.is_empty() { String::new() } else { format!("**Contents**\n\n{}\n\n", lines.join("\n")) }
     }
 
     /// `text` with each reference as a link, or as words where its target is not on the page.
@@ -90,8 +90,11 @@ impl Page {
     pub fn figure(&mut self, key: &str, path: &str, caption: &str, also: &str) {
         self.figures.push(key.to_owned());
         let n = self.figures.len();
-        // What a reader without the image is told: the caption as plain text.
-        let alt: String = self.resolved(caption).chars().filter(|c| !"[]`*".contains(*c)).collect();
+        // What a reader without the image is told: the caption as plain text, without sentences that link elsewhere.
+        let sentences =
+            caption.split_inclusive(". ").filter(|sentence| !(sentence.contains(OPEN) || sentence.contains("](")));
+        let alt: String = sentences.collect::<String>().chars().filter(|c| !"[]`".contains(*c)).collect();
+        let alt = alt.trim_end();
         self.block(&format!("<a id=\"figure-{n}\"></a>![Figure {n}. {alt}]({path})"));
         self.block(&format!("**Figure {n}.** {caption}{also}"));
     }
@@ -212,7 +215,7 @@ mod tests {
         let mut page = Page::new();
         page.paragraph(&format!("See {}, {} and {}.", figure_ref("b"), table_ref("t"), figure_ref("gone")));
         page.figure("a", "a.svg", "One.", "");
-        page.figure("b", "b.svg", "Two, `x`, as [here](y).", " ([PNG](b.png))");
+        page.figure("b", "b.svg", "Two, `x` [1, 2]. As [here](y).", " ([PNG](b.png))");
         page.captioned_table("empty", "Nothing.", &["x"], &[]);
         page.captioned_table("t", "Three.", &["x"], &[vec!["y".to_owned()]]);
         let text = page.finish();
@@ -220,7 +223,7 @@ mod tests {
             text.starts_with("See [Figure 2](#figure-2), [Table 1](#table-1) and a figure that is not here.\n\n"),
             "{text}"
         );
-        assert!(text.contains("<a id=\"figure-2\"></a>![Figure 2. Two, x, as here(y).](b.svg)\n\n**Figure 2.** Two, `x`, as [here](y). ([PNG](b.png))\n"), "{text}");
+        assert!(text.contains("<a id=\"figure-2\"></a>![Figure 2. Two, x 1, 2.](b.svg)\n\n**Figure 2.** Two, `x` [1, 2]. As [here](y). ([PNG](b.png))\n"), "{text}");
         assert!(text.ends_with("<a id=\"table-1\"></a>**Table 1.** Three.\n\n| x |\n| --- |\n| y |\n"), "{text}");
     }
 
@@ -235,7 +238,7 @@ mod tests {
         page.heading(2, "B");
         page.heading(3, "Part");
         let text = page.finish();
-        let list = "# Title\n\n- [A](#a)\n  - [Part](#part)\n- [B](#b)\n  - [Part](#part-1)\n\n## A\n";
+        let list = "# Title\n\n**Contents**\n\n- [A](#a)\n  - [Part](#part)\n- [B](#b)\n  - [Part](#part-1)\n\n## A\n";
         assert!(text.starts_with(list), "{text}");
     }
 

@@ -3,19 +3,15 @@
 use std::path::Path;
 
 use crate::error::{Error, Result};
-use crate::experiment::results::read_image;
+use crate::experiment::results::{ImageRow, read_image};
 use crate::film::{Image, to_screen};
 
+use super::details::{Detail, Stages, Truth, details};
 use super::figure::Rgb8;
 use super::numbers::{short, signed};
 use super::pictures::{Crop, ScaleBar, StripCell, StripLayout, error_map, error_scale, strip};
+use super::shots::{PictureSet, Shot};
 use super::summarise::Summary;
-
-/// Exposure of pictures shown: the scene files' own is not in the rows, and every picture has to have the same.
-pub const EXPOSURE: f32 = 3.0;
-/// Edge of a crop, in pixels of the image, where the image is large enough.
-const CROP: u32 = 28;
-const ZOOM: u32 = 4;
 
 /// Reads an image; one that is not there is an error like any other.
 fn image(dir: &Path, id: &str) -> Result<Image> {
@@ -23,112 +19,53 @@ fn image(dir: &Path, id: &str) -> Result<Image> {
 }
 
 /// As shown on a screen.
-fn shown(image: &Image) -> Rgb8 {
-    Rgb8 { width: image.width, height: image.height, bytes: to_screen(image, EXPOSURE) }
+fn shown(image: &Image, exposure: f32) -> Rgb8 {
+    Rgb8 { width: image.width, height: image.height, bytes: to_screen(image, exposure) }
 }
 
-/// The mean of the pictures' two reference halves, or the closed form.
-fn reference(dir: &Path, summary: &Summary) -> Result<Image> {
-    let row = summary.picture_reference.as_ref();
+/// The pictures' two reference halves and their mean, or the closed form.
+fn truth(dir: &Path, set: &PictureSet) -> Result<Truth> {
+    let row = set.reference.as_ref();
     let row =
         row.ok_or_else(|| Error::incomplete(dir.display(), "expected a reference of the pictures, found none"))?;
-    let Some([a, b]) = &row.halves else { return image(dir, &row.id) };
-    let (a, b) = (image(dir, a)?, image(dir, b)?);
+    let (a, b) = match &row.halves {
+        None => (image(dir, &row.id)?, image(dir, &row.id)?),
+        Some([a, b]) => (image(dir, a)?, image(dir, b)?),
+    };
     let mean = |(a, b): (&[f32; 3], &[f32; 3])| [0, 1, 2].map(|c| ((f64::from(a[c]) + f64::from(b[c])) / 2.0) as f32);
-    Ok(Image { pixels: std::iter::zip(&a.pixels, &b.pixels).map(mean).collect(), ..a })
+    let pixels = std::iter::zip(&a.pixels, &b.pixels).map(mean).collect();
+    Ok(Truth { mean: Image { width: a.width, height: a.height, pixels }, halves: [a, b] })
 }
 
-/// The sheet's Figure 1.
+/// The sheet's Figure 1: the stages that the scene has.
 ///
 /// # Errors
 /// Kind `Input` where an image cannot be read.
-pub fn stages(dir: &Path, summary: &Summary) -> Result<Rgb8> {
+pub fn stages(dir: &Path, set: &PictureSet) -> Result<Rgb8> {
+    let rows = set.stages_shown();
     let images: Vec<Rgb8> =
-        summary.stages.iter().map(|row| image(dir, &row.id).map(|i| shown(&i))).collect::<Result<_>>()?;
-    let words = ["pixel centres, albedo", "+ sampled pixel", "+ sampled lens", "+ sampled area light"];
-    let cells: Vec<StripCell> = summary
-        .stages
+        rows.iter().map(|row| image(dir, &row.id).map(|i| shown(&i, set.exposure))).collect::<Result<_>>()?;
+    let words = ["pixel centres, albedo", "+ sampled pixel", "+ sampled lens", "+ sampled lights"];
+    let cells: Vec<StripCell> = rows
         .iter()
         .zip(&images)
         .map(|(row, image)| StripCell {
-            image,
-            title: row.stage.name().to_owned(),
             captions: vec![format!("{}, {} spp", words[row.stage as usize], row.spp.taken)],
+            ..StripCell::new(image, row.stage.name())
         })
         .collect();
     strip(&cells, &StripLayout { columns: 2, whole: Some(1), crops: Vec::new(), scale_bar: None })
 }
 
-/// A part of the picture worth a closer look, and why.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Detail {
-    /// What is to be seen there, and how it was found.
-    pub name: &'static str,
-    /// Where.
-    pub crop: Crop,
-}
-
-/// The three windows to enlarge, each scored where the light falls: where sampling the pixel changes most and the lens
-/// does not, where the lens does, and where the relative errors of all pictures are largest though neither does. Without the stages' images, or
-/// where windows do not fit: none.
-fn details(dir: &Path, summary: &Summary, reference: &Image, pictures: &[Image]) -> Vec<Detail> {
-    let images: Option<Vec<Image>> = summary.stages.iter().map(|row| image(dir, &row.id).ok()).collect();
-    let Some(images) = images.filter(|images| images.len() == 4) else { return Vec::new() };
-    let (width, height) = (reference.width, reference.height);
-    let fits = |i: &Image| (i.width, i.height) == (width, height);
-    if width < 3 * CROP || height < CROP || !images.iter().chain(pictures).all(fits) {
-        return Vec::new();
-    }
-    let grey = |image: &Image, i: usize| image.pixels[i].iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0;
-    let square = |a: &Image, b: &Image, i: usize| (grey(a, i) - grey(b, i)) * (grey(a, i) - grey(b, i));
-    let [edge, blur] = [0, 1].map(|k| move |images: &[Image], i: usize| square(&images[k], &images[k + 1], i));
-    // A change of albedo below 0.02 is none.
-    let even = |change: f64| 1.0 / (1.0 + change / 4e-4);
-    let light = |i: usize| (grey(&images[3], i) / grey(&images[2], i).max(0.02)).min(1.0);
-    let bright = |i: usize| grey(reference, i) * grey(reference, i) + 0.01;
-    let error = |i: usize| pictures.iter().map(|p| square(p, reference, i)).sum::<f64>() / bright(i);
-    let score = |f: &dyn Fn(usize) -> f64| (0..reference.pixels.len()).map(f).collect::<Vec<f64>>();
-    let wanted = [
-        (
-            "edges (the pixel matters most, the lens does not)",
-            score(&|i| edge(&images, i) * light(i) * even(blur(&images, i))),
-        ),
-        ("defocus (the lens matters most)", score(&|i| blur(&images, i) * light(i))),
-        ("shadow (the light matters most)", score(&|i| error(i) * even(edge(&images, i)) * even(blur(&images, i)))),
-    ];
-    let mut found: Vec<Detail> = Vec::new();
-    for ((name, score), colour) in wanted.into_iter().zip([[230, 159, 0], [86, 180, 233], [0, 158, 115]]) {
-        if let Some((x, y)) = best_window(&score, (width, height), &found) {
-            found.push(Detail { name, crop: Crop { x, y, width: CROP, height: CROP, zoom: ZOOM, colour } });
-        }
-    }
-    found
-}
-
-/// The corner of the window of the largest sum that does not touch those found before.
-fn best_window(score: &[f64], (width, height): (u32, u32), taken: &[Detail]) -> Option<(u32, u32)> {
-    let free = |x: u32, y: u32| taken.iter().all(|d| x.abs_diff(d.crop.x) >= CROP || y.abs_diff(d.crop.y) >= CROP);
-    let sum = |x: u32, y: u32| -> f64 {
-        (y..y + CROP)
-            .flat_map(|row| (x..x + CROP).map(move |column| (row * width + column) as usize))
-            .map(|i| score[i])
-            .sum()
-    };
-    let corners = (0..=height - CROP).step_by(4).flat_map(|y| (0..=width - CROP).step_by(4).map(move |x| (x, y)));
-    corners
-        .filter(|&(x, y)| free(x, y))
-        .map(|at| (sum(at.0, at.1), at))
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, at)| at)
-}
-
-/// Strips of the pictures and what they show.
+/// Strips of the pictures of one scene and what they show.
 pub struct Strips {
     /// The reference, whole, its details outlined.
     pub whole: Rgb8,
-    /// Details of every picture, enlarged; `None` where there are none.
+    /// Details of every picture at equal samples, enlarged; `None` where there are none.
     pub details: Option<Rgb8>,
-    /// Signed errors of every picture.
+    /// The same at equal time; `None` where that cannot be shown.
+    pub equal_time: Option<Rgb8>,
+    /// Signed errors of every picture at equal samples.
     pub errors: Rgb8,
     /// The pictures themselves, by file name without ending.
     pub whole_pictures: Vec<(String, Rgb8)>,
@@ -136,86 +73,146 @@ pub struct Strips {
     pub names: Vec<&'static str>,
 }
 
-/// Draws the strips.
+/// A picture, its image, and the line of text under it.
+struct Shown<'a> {
+    shot: &'a Shot,
+    image: Image,
+    captions: Vec<String>,
+}
+
+/// Draws the strips of a scene.
 ///
 /// # Errors
 /// Kind `Input` where an image cannot be read.
-pub fn strips(dir: &Path, summary: &Summary) -> Result<Strips> {
-    let reference = reference(dir, summary)?;
-    let images: Vec<Image> = summary.pictures.iter().map(|row| image(dir, &row.id)).collect::<Result<_>>()?;
-    let details = details(dir, summary, &reference, &images);
-    let crops: Vec<Crop> = details.iter().map(|detail| detail.crop).collect();
-    let title = "reference".to_owned();
-    let whole_shown = shown(&reference);
-    let whole = vec![StripCell { image: &whole_shown, title: title.clone(), captions: Vec::new() }];
-    let layout = StripLayout { columns: 1, whole: Some(3), crops: crops.clone(), scale_bar: None };
-    // The outlines alone: enlargements stand in the other strip.
-    let outlined = StripLayout { crops: crops.iter().map(|crop| Crop { zoom: 3, ..*crop }).collect(), ..layout };
+pub fn strips(dir: &Path, summary: &Summary, set: &PictureSet) -> Result<Strips> {
+    let truth = truth(dir, set)?;
+    let load = |shot: &Shot| image(dir, &shot.row.id);
+    let equal_spp: Vec<Shown> = set
+        .at_equal_spp()
+        .into_iter()
+        .map(|shot| Ok(Shown { shot, image: load(shot)?, captions: captions(&shot.row) }))
+        .collect::<Result<_>>()?;
+    let images: Vec<&Image> = equal_spp.iter().map(|shown| &shown.image).collect();
+    let found = find_details(dir, set, &truth, &images);
+    let crops: Vec<Crop> = found.iter().map(|detail| detail.crop).collect();
+    let on_screen = shown(&truth.mean, set.exposure);
+    let equal_time = match summary.uniform().and_then(|uniform| set.at_equal_time(uniform)) {
+        Some(chosen) if !crops.is_empty() => {
+            let timed: Vec<Shown> = chosen
+                .choices
+                .iter()
+                .map(|choice| {
+                    let captions = timed_captions(choice.seconds, &choice.shot.row);
+                    Ok(Shown { shot: choice.shot, image: load(choice.shot)?, captions })
+                })
+                .collect::<Result<_>>()?;
+            Some(detail_strip(summary, set, &truth, &timed, &crops)?)
+        }
+        _ => None,
+    };
     Ok(Strips {
-        whole: strip(&whole, &outlined)?,
-        details: (!crops.is_empty()).then(|| detail_strip(summary, &title, &reference, &images, &crops)).transpose()?,
-        errors: error_strip(summary, &reference, &images)?,
-        names: details.iter().map(|detail| detail.name).collect(),
-        whole_pictures: whole_pictures(summary, whole_shown, &images),
+        whole: outlined(&on_screen, &crops)?,
+        details: (!crops.is_empty()).then(|| detail_strip(summary, set, &truth, &equal_spp, &crops)).transpose()?,
+        equal_time,
+        errors: error_strip(summary, &truth.mean, &equal_spp)?,
+        names: found.iter().map(|detail| detail.name).collect(),
+        whole_pictures: whole_pictures(summary, set, on_screen, &equal_spp),
     })
 }
 
+/// The details of a scene; none where an image of its stages is not there.
+fn find_details(dir: &Path, set: &PictureSet, truth: &Truth, images: &[&Image]) -> Vec<Detail> {
+    let rows = set.stages_shown().into_iter();
+    let stages: Option<Vec<_>> = rows.map(|row| Some((row.stage, image(dir, &row.id).ok()?))).collect();
+    let is_complete = set.stages.len() == set.stages_planned();
+    let stages = stages.filter(|_| is_complete).and_then(Stages::new);
+    stages.map_or(Vec::new(), |stages| details(&stages, &truth.mean, images))
+}
+
+/// The whole reference with the details outlined, about a page wide.
+fn outlined(reference: &Rgb8, crops: &[Crop]) -> Result<Rgb8> {
+    let zoom = (960 / reference.width.max(1)).clamp(1, 4);
+    let cells = [StripCell::new(reference, "reference")];
+    let crops = crops.iter().map(|crop| Crop { zoom, ..*crop }).collect();
+    strip(&cells, &StripLayout { columns: 1, whole: Some(zoom), crops, scale_bar: None })
+}
+
 /// The reference and each picture as shown, named in the order of the table, for an image viewer to flip through.
-fn whole_pictures(summary: &Summary, reference: Rgb8, images: &[Image]) -> Vec<(String, Rgb8)> {
-    let label = |i: usize| {
-        let canonical = &summary.pictures[i].sampler;
-        let label = summary.samplers.iter().find(|s| s.canonical == *canonical).map_or(canonical, |s| &s.label);
-        format!("{:02}-{}", i + 1, label.replace([':', '@'], "-"))
+fn whole_pictures(summary: &Summary, set: &PictureSet, reference: Rgb8, pictures: &[Shown]) -> Vec<(String, Rgb8)> {
+    let name = |i: usize, sampler: usize| {
+        format!("{:02}-{}", i + 1, summary.samplers[sampler].label.replace(|c: char| !c.is_ascii_alphanumeric(), "-"))
     };
-    let pictures = images.iter().enumerate().map(|(i, image)| (label(i), shown(image)));
+    let pictures = pictures.iter().enumerate().map(|(i, p)| (name(i, p.shot.sampler), shown(&p.image, set.exposure)));
     std::iter::once(("00-reference".to_owned(), reference)).chain(pictures).collect()
 }
 
-/// Under each picture: its error.
-fn captions(summary: &Summary, i: usize) -> Vec<String> {
-    let row = &summary.pictures[i];
-    let mut lines = Vec::new();
-    if let Some(errors) = &row.errors {
-        let rmse = match errors.mse_unbiased > 0.0 {
-            true => short(errors.mse_unbiased.sqrt()),
-            false => "below the reference's noise".to_owned(),
-        };
-        lines.push(format!("{} spp, RMSE {rmse}", row.spp.taken));
-        lines.extend(errors.error_autocorrelation.map(|rho| format!("ρ of neighbours {}", signed(rho))));
-    }
-    lines
+/// RMSE in words.
+pub fn rmse_words(row: &ImageRow) -> Option<String> {
+    let errors = row.errors.as_ref()?;
+    Some(match errors.mse_unbiased > 0.0 {
+        true => short(errors.mse_unbiased.sqrt()),
+        false => "below noise".to_owned(),
+    })
 }
 
-fn sampler_title(summary: &Summary, i: usize) -> String {
-    let row = &summary.pictures[i];
-    summary.samplers.iter().find(|s| s.canonical == row.sampler).map_or(&row.sampler, |s| &s.label).clone()
+/// Under each picture at equal samples: its error.
+fn captions(row: &ImageRow) -> Vec<String> {
+    let rmse = rmse_words(row).map(|rmse| format!("{} spp, RMSE {rmse}", row.spp.taken));
+    let rho = row.errors.as_ref().and_then(|errors| errors.error_autocorrelation);
+    rmse.into_iter().chain(rho.map(|rho| format!("ρ of neighbours {}", signed(rho)))).collect()
 }
 
-fn detail_strip(summary: &Summary, title: &str, reference: &Image, images: &[Image], crops: &[Crop]) -> Result<Rgb8> {
-    let shown: Vec<Rgb8> = std::iter::once(reference).chain(images).map(shown).collect();
-    let cells: Vec<StripCell> = shown
+/// Under each picture at equal time: what it took.
+fn timed_captions(seconds: f64, row: &ImageRow) -> Vec<String> {
+    let rmse = rmse_words(row).map(|rmse| format!("RMSE {rmse}"));
+    std::iter::once(format!("{} spp in {} s", row.spp.taken, short(seconds))).chain(rmse).collect()
+}
+
+/// Crops of the reference and of every picture, under each its error and under all that of the whole picture.
+fn detail_strip(
+    summary: &Summary,
+    set: &PictureSet,
+    truth: &Truth,
+    pictures: &[Shown],
+    crops: &[Crop],
+) -> Result<Rgb8> {
+    let images: Vec<Rgb8> = std::iter::once(&truth.mean)
+        .chain(pictures.iter().map(|p| &p.image))
+        .map(|image| shown(image, set.exposure))
+        .collect();
+    let cells: Vec<StripCell> = images
         .iter()
         .enumerate()
-        .map(|(i, image)| match i.checked_sub(1) {
-            None => StripCell { image, title: title.to_owned(), captions: Vec::new() },
-            Some(i) => StripCell { image, title: sampler_title(summary, i), captions: captions(summary, i) },
+        .map(|(i, on_screen)| match i.checked_sub(1).map(|i| &pictures[i]) {
+            None => StripCell::new(on_screen, "reference"),
+            Some(p) => StripCell {
+                captions: p.captions.clone(),
+                crop_captions: crops
+                    .iter()
+                    .map(|crop| truth.rmse_in(&p.image, crop).map_or("< noise".to_owned(), short))
+                    .collect(),
+                ..StripCell::new(on_screen, &summary.samplers[p.shot.sampler].label)
+            },
         })
         .collect();
     strip(&cells, &StripLayout { columns: 4, whole: None, crops: crops.to_vec(), scale_bar: None })
 }
 
-fn error_strip(summary: &Summary, reference: &Image, images: &[Image]) -> Result<Rgb8> {
-    let scale = error_scale(images, reference)?;
+fn error_strip(summary: &Summary, reference: &Image, pictures: &[Shown]) -> Result<Rgb8> {
+    let scale = error_scale(pictures.iter().map(|p| &p.image), reference)?;
     let black = Image::black(reference.width, reference.height);
-    let map = |image: &Image| error_map(&in_steps(image, reference, scale), &black, scale);
-    let maps: Vec<Rgb8> = images.iter().map(map).collect::<Result<_>>()?;
-    let cells: Vec<StripCell> = maps
+    let map = |p: &Shown| error_map(&in_steps(&p.image, reference, scale), &black, scale);
+    let maps: Vec<Rgb8> = pictures.iter().map(map).collect::<Result<_>>()?;
+    let cells: Vec<StripCell> = pictures
         .iter()
-        .enumerate()
-        .map(|(i, image)| StripCell { image, title: sampler_title(summary, i), captions: captions(summary, i) })
+        .zip(&maps)
+        .map(|(p, map)| StripCell {
+            captions: p.captions.clone(),
+            ..StripCell::new(map, &summary.samplers[p.shot.sampler].label)
+        })
         .collect();
-    let scale_bar = Some(ScaleBar { scale, label: "luminance − reference (radiance)".to_owned() });
-    strip(&cells, &StripLayout { columns: 5, whole: Some(1), crops: Vec::new(), scale_bar })
+    let scale_bar = Some(ScaleBar { scale, label: "luminance − reference (W/(m² sr))".to_owned() });
+    strip(&cells, &StripLayout { columns: 4, whole: Some(1), crops: Vec::new(), scale_bar })
 }
 
 /// The errors in luminance as a grey image, in steps of a fifth of `scale`: enough to tell structure from noise, and the file is

@@ -52,11 +52,7 @@ pub fn point_set_contact_sheet(sets: &[NamedPoints], columns: usize) -> Rgb8 {
     // Dots keep the share of the panel that the sheet gives them, to the nearest odd number of pixels.
     let dot = (2 * (panel * SHEET_DOT / SHEET_PANEL / 2) + 1).clamp(3, SHEET_DOT);
     let panels: Vec<Rgb8> = sets.iter().map(|set| point_set_panel(&set.points, panel, dot)).collect();
-    let cells: Vec<StripCell> = sets
-        .iter()
-        .zip(&panels)
-        .map(|(set, image)| StripCell { image, title: set.name.clone(), captions: Vec::new() })
-        .collect();
+    let cells: Vec<StripCell> = sets.iter().zip(&panels).map(|(set, image)| StripCell::new(image, &set.name)).collect();
     Grid::new(&cells, &StripLayout { columns, whole: Some(1), crops: Vec::new(), scale_bar: None }).drawn(&cells)
 }
 
@@ -69,6 +65,15 @@ pub struct StripCell<'a> {
     pub title: String,
     /// Below it, a line each: `RMSE 0.0123 ± 0.0004`.
     pub captions: Vec<String>,
+    /// Below each of its enlargements, a few letters: `0.0123`.
+    pub crop_captions: Vec<String>,
+}
+
+impl<'a> StripCell<'a> {
+    /// An image with its title alone.
+    pub fn new(image: &'a Rgb8, title: &str) -> Self {
+        Self { image, title: title.to_owned(), captions: Vec::new(), crop_captions: Vec::new() }
+    }
 }
 
 /// A rectangle of the image shown enlarged below it.
@@ -170,6 +175,8 @@ struct Grid<'a> {
     /// Strip pixels for one pixel of the page.
     scale: f64,
     captions: Vec<Vec<String>>,
+    /// Whether a line below the enlargements says something of each.
+    has_crop_captions: bool,
 }
 
 impl<'a> Grid<'a> {
@@ -191,7 +198,8 @@ impl<'a> Grid<'a> {
                 cell.captions.iter().flat_map(|line| wrapped(line, SMALL, false, f64::from(width) / scale)).collect()
             })
             .collect();
-        Self { layout, columns, whole, crops, scale, captions }
+        let has_crop_captions = cells.iter().any(|cell| !cell.crop_captions.is_empty());
+        Self { layout, columns, whole, crops, scale, captions, has_crop_captions }
     }
 
     /// Page pixels → strip pixels.
@@ -209,7 +217,12 @@ impl<'a> Grid<'a> {
     }
 
     fn image_height(&self) -> u32 {
-        self.whole.1 + self.crop_gap() + self.crops.1
+        self.whole.1 + self.crop_gap() + self.crops.1 + self.pixels(self.crop_caption_height())
+    }
+
+    /// Height of the line below the enlargements, in page pixels.
+    fn crop_caption_height(&self) -> f64 {
+        if self.has_crop_captions { CAPTION_STEP } else { 0.0 }
     }
 
     fn cell_height(&self) -> u32 {
@@ -270,6 +283,14 @@ impl<'a> Grid<'a> {
             align: Align::Left,
             turned: false,
         });
+        let mut across = 0.0;
+        let under = y + TITLE_STEP + f64::from(self.image_height()) / self.scale - self.crop_caption_height() + 13.0;
+        for (crop, text) in self.layout.crops.iter().zip(&cell.crop_captions) {
+            let width = f64::from(crop.width * crop.zoom) / self.scale;
+            let text = shortened(text, SMALL, false, width);
+            texts.text((x + across + width / 2.0, under), &text, SMALL, GREY, Align::Centre);
+            across += width + 4.0 / self.scale;
+        }
         let below = y + TITLE_STEP + f64::from(self.image_height()) / self.scale + 15.0;
         for (i, caption) in captions.iter().enumerate() {
             texts.text((x, below + i as f64 * CAPTION_STEP), caption, SMALL, INK, Align::Left);
@@ -431,7 +452,12 @@ mod tests {
         image.set(3, 2, [200, 100, 50]);
         let crop = Crop { x: 2, y: 1, width: 4, height: 4, zoom: 10, colour: [255, 0, 0] };
         let layout = StripLayout { columns: 1, whole: Some(4), crops: vec![crop], scale_bar: None };
-        let cell = StripCell { image: &image, title: "ld:best".into(), captions: vec!["RMSE 0.01".into()] };
+        let cell = StripCell {
+            image: &image,
+            title: "ld:best".into(),
+            captions: vec!["RMSE 0.01".into()],
+            ..StripCell::new(&image, "")
+        };
         let strip = strip(&[cell], &layout).unwrap();
         let (left, top) = (MARGIN as u32, (MARGIN + TITLE_STEP) as u32);
         assert_eq!(strip.width, 40 + 2 * left);
@@ -446,7 +472,7 @@ mod tests {
     #[test]
     fn a_crop_outside_its_image_or_too_large_is_an_input_error() {
         let image = Rgb8::filled(8, 6, WHITE);
-        let cell = StripCell { image: &image, title: "ld".into(), captions: vec![] };
+        let cell = StripCell::new(&image, "ld");
         for (x, width, zoom) in [(6, 4, 2), (u32::MAX, 2, 2), (0, 0, 2), (0, 2, 0), (0, 2, u32::MAX)] {
             let crop = Crop { x, y: 0, width, height: 2, zoom, colour: [0; 3] };
             let layout = StripLayout { columns: 1, whole: None, crops: vec![crop], scale_bar: None };

@@ -8,13 +8,15 @@ mod variants;
 use std::collections::HashMap;
 
 use crate::experiment::results::{
-    About, Count, EnsembleRow, Estimator, ImageRow, Kind, PointsRow, ReferenceRow, Row, Timing, TwinDifference, Variant,
+    About, Count, EnsembleRow, Estimator, ImageRow, Kind, PointsRow, ReferenceRow, Row, SceneFacts, Stage, Timing,
+    TwinDifference, Variant,
 };
-use crate::experiment::spec::{Experiment, SamplerEntry};
+use crate::experiment::spec::{Experiment, Pictures, SamplerEntry};
 use crate::sampling::{Decision, Order, Points, Preset, Random, SamplerSet, SamplerSpec, Scope};
 use crate::stats::{Estimate, SlopeFit, slope_with_interval, t_interval};
 
 use super::evidence::{Course, ratio, ratio_of_roots};
+use super::shots::{PictureSet, Shot};
 use super::style::{Style, style_of, style_of_set};
 pub use variants::Subject;
 
@@ -43,12 +45,8 @@ pub struct Summary {
     pub shortcut: Vec<Cell>,
     /// By sampler and number of points.
     pub point_sets: Vec<PointSet>,
-    /// The pictures, in the order of the samplers.
-    pub pictures: Vec<ImageRow>,
-    /// The pictures' reference.
-    pub picture_reference: Option<ReferenceRow>,
-    /// The pictures of the sheet's Figure 1, in its order.
-    pub stages: Vec<ImageRow>,
+    /// Pictures to look at, by scene.
+    pub pictured: Vec<PictureSet>,
     /// Times, where any were taken.
     pub speeds: Vec<Speed>,
     /// Sets that are not compared in a scene: scene, sampler, and the sampler that means the same there.
@@ -250,13 +248,10 @@ impl Summary {
         self.slopes.iter().find(|s| s.scene == scene && s.sampler == sampler)
     }
 
-    /// How many stages Figure 1 has: four, or three where the pictures' scene has no lens to sample.
-    pub fn stages_planned(&self) -> usize {
-        let experiment = &self.about.experiment;
-        let scene = experiment.pictures.as_ref().map(|pictures| &pictures.scene);
-        let at = experiment.scenes.iter().position(|name| Some(name) == scene);
-        let facts = at.and_then(|at| self.about.scenes.get(at));
-        if facts.is_some_and(|facts| !facts.lens) { 3 } else { 4 }
+    /// The pictures whose stages are the sheet's Figure 1: the first with all four, else the first.
+    pub fn figure_1(&self) -> Option<&PictureSet> {
+        let complete = |set: &&PictureSet| set.has_lens && set.has_lights;
+        self.pictured.iter().find(complete).or(self.pictured.first())
     }
 
     /// The times of a cell.
@@ -346,9 +341,7 @@ pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
         stability: Vec::new(),
         shortcut: Vec::new(),
         point_sets: Vec::new(),
-        pictures: Vec::new(),
-        picture_reference: None,
-        stages: index.stages.clone(),
+        pictured: Vec::new(),
         speeds: Vec::new(),
         left_out: Vec::new(),
         missing: Vec::new(),
@@ -359,7 +352,7 @@ pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
     index.add_stability(&mut summary);
     index.add_shortcut(&mut summary);
     index.add_points(&mut summary);
-    index.add_pictures(&mut summary);
+    index.add_pictures(&mut summary, timings);
     index.add_speeds(&mut summary, timings);
     summary
 }
@@ -431,7 +424,7 @@ struct Index<'a> {
     primary: Estimator,
     points: HashMap<(&'a str, u32), Vec<&'a PointsRow>>,
     pictures: Vec<&'a ImageRow>,
-    stages: Vec<ImageRow>,
+    stages: Vec<&'a ImageRow>,
 }
 
 impl<'a> Index<'a> {
@@ -461,14 +454,8 @@ impl<'a> Index<'a> {
                 Row::Image(row) => {
                     index.images.insert(&row.id, row);
                     match row.kind {
-                        Kind::Picture => {
-                            index.pictures.retain(|other| other.sampler != row.sampler);
-                            index.pictures.push(row);
-                        }
-                        Kind::Stage => {
-                            index.stages.retain(|other| other.stage != row.stage);
-                            index.stages.push(row.clone());
-                        }
+                        Kind::Picture => index.pictures.push(row),
+                        Kind::Stage => index.stages.push(row),
                         _ => {}
                     }
                 }
@@ -601,26 +588,63 @@ impl<'a> Index<'a> {
         }
     }
 
-    /// Pictures by sampler, and what they were compared with.
-    fn add_pictures(&self, summary: &mut Summary) {
-        let Some(pictures) = &summary.about.experiment.pictures else { return };
-        let of = |sampler: &SamplerSummary| {
-            self.pictures.iter().find(|row| row.sampler == sampler.canonical && row.size == pictures.size)
+    /// Pictures by scene, sampler and count, what they were compared with, and the stages beside them.
+    fn add_pictures(&self, summary: &mut Summary, timings: &[Timing]) {
+        let times: HashMap<&str, &Timing> = timings.iter().map(|timing| (timing.id.as_str(), timing)).collect();
+        let (mut pictures, mut stages) = ([0, 0], [0, 0]);
+        for asked in &summary.about.experiment.pictures {
+            let Some(scene) = summary.about.experiment.scenes.iter().position(|name| *name == asked.scene) else {
+                continue;
+            };
+            let Some(facts) = summary.about.scenes.get(scene) else { continue };
+            let set = self.picture_set(summary, asked, scene, facts, &times);
+            pictures = [pictures[0] + set.shots.len(), pictures[1] + summary.compared(scene).count() * asked.spp.len()];
+            stages = [stages[0] + set.stages.len(), stages[1] + set.stages_planned()];
+            summary.pictured.push(set);
+        }
+        for ([found, planned], word) in [(pictures, "pictures"), (stages, "stages of Figure 1")] {
+            if found < planned {
+                summary.missing.push(format!("{} of {planned} {word}", planned - found));
+            }
+        }
+    }
+
+    /// The pictures of one scene.
+    fn picture_set(
+        &self,
+        summary: &Summary,
+        asked: &Pictures,
+        scene: usize,
+        facts: &SceneFacts,
+        times: &HashMap<&str, &Timing>,
+    ) -> PictureSet {
+        let ours = |row: &&&ImageRow| row.scene == facts.name && row.size == asked.size;
+        let find = |sampler: usize, spp: u32| -> Option<Shot> {
+            let canonical = &summary.samplers[sampler].canonical;
+            let is_it = |row: &&&ImageRow| row.sampler == *canonical && row.spp.asked == spp;
+            let row = self.pictures.iter().filter(ours).rfind(is_it)?;
+            let time = times.get(row.id.as_str());
+            Some(Shot {
+                sampler,
+                row: (*row).clone(),
+                seconds: time.map(|time| time.seconds),
+                threads_and_load: time.and_then(|time| Some((time.threads, time.load?))),
+            })
         };
-        let found: Vec<ImageRow> = summary.samplers.iter().filter_map(of).map(|&row| row.clone()).collect();
-        let scene = summary.about.experiment.scenes.iter().position(|scene| *scene == pictures.scene);
-        let planned = scene.map_or(summary.samplers.len(), |scene| summary.compared(scene).count());
-        if found.len() < planned {
-            summary.missing.push(format!("{} of {planned} pictures", planned - found.len()));
+        let wanted = summary.compared(scene).flat_map(|sampler| asked.spp.iter().map(move |&spp| (sampler, spp)));
+        let shots: Vec<Shot> = wanted.filter_map(|(sampler, spp)| find(sampler, spp)).collect();
+        let stage = |stage: &Stage| self.stages.iter().filter(ours).rfind(|row| row.stage == *stage).copied().cloned();
+        let id = shots.iter().find_map(|shot| shot.row.errors.as_ref()).map(|errors| errors.reference_id.as_str());
+        PictureSet {
+            scene,
+            pictures: asked.clone(),
+            exposure: facts.exposure,
+            has_lens: facts.lens,
+            has_lights: facts.layout.contains(Decision::LightPoint.name()),
+            reference: id.and_then(|id| self.references.get(id)).map(|&row| row.clone()),
+            stages: Stage::ALL.iter().filter_map(stage).collect(),
+            shots,
         }
-        let (stages, planned) = (summary.stages.len(), summary.stages_planned());
-        if stages < planned {
-            summary.missing.push(format!("{} of {planned} stages of Figure 1", planned - stages));
-        }
-        let id = found.iter().find_map(|row| row.errors.as_ref()).map(|errors| errors.reference_id.as_str());
-        summary.picture_reference = id.and_then(|id| self.references.get(id)).map(|&row| row.clone());
-        summary.pictures = found;
-        summary.stages.sort_by_key(|row| row.stage as u8);
     }
 
     /// Seconds of the images of each cell; of an image that was timed twice the last time counts.

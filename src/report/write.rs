@@ -7,7 +7,9 @@ use crate::error::{Error, Result};
 use crate::experiment::results::{about_path, read, read_about, read_timings, results_path, timings_path};
 use crate::film::write_whole;
 
+use super::charts::of_scene;
 use super::figure::{Figure, Rgb8};
+use super::shots::PictureSet;
 use super::summarise::{Summary, summarise};
 use super::{charts, pictured, provenance, sections, stability, tables};
 
@@ -26,8 +28,8 @@ pub enum FigureState {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Figures {
     states: BTreeMap<String, FigureState>,
-    /// What the enlarged details show, left to right.
-    pub details: Vec<String>,
+    /// What the enlarged details show, left to right, by scene.
+    pub details: BTreeMap<String, Vec<String>>,
 }
 
 impl Figures {
@@ -66,7 +68,7 @@ impl Written {
     }
 }
 
-/// The names of the enlarged details, left to right, a line each.
+/// The names of the enlarged details, left to right, `scene: name`, a line each.
 fn details_path(dir: &Path) -> PathBuf {
     dir.join("figures").join("details.txt")
 }
@@ -111,40 +113,78 @@ fn draw(dir: &Path, summary: &Summary) -> Result<Figures> {
     pen.chart("stability", charts::stability(summary))?;
     pen.chart("which-decision", charts::which_decision(summary))?;
     for (i, scene) in summary.scenes.iter().enumerate() {
-        pen.chart(&charts::speed_name(&scene.name), charts::speed(summary, i))?;
+        pen.chart(&of_scene("speed", &scene.name), charts::speed(summary, i))?;
     }
-    if summary.stages.len() == summary.stages_planned() {
-        pen.raster("stages", pictured::stages(dir, summary).map_err(|e| e.to_string()))?;
+    if let Some(set) = summary.figure_1().filter(|set| set.stages.len() == set.stages_planned()) {
+        pen.raster("stages", pictured::stages(dir, set).map_err(|e| e.to_string()))?;
     }
-    if !summary.pictures.is_empty() {
-        match pictured::strips(dir, summary) {
-            Ok(strips) => {
-                pen.raster("reference", Ok(strips.whole))?;
-                if let Some(details) = strips.details {
-                    pen.raster("details", Ok(details))?;
+    let mut kept = kept_details(dir);
+    for set in summary.pictured.iter().filter(|set| !set.shots.is_empty()) {
+        draw_pictures(dir, summary, set, &mut pen, &mut kept)?;
+    }
+    if !kept.is_empty() {
+        let lines: Vec<String> =
+            kept.iter().flat_map(|(scene, names)| names.iter().map(move |name| format!("{scene}: {name}"))).collect();
+        write_whole(&details_path(dir), (lines.join("\n") + "\n").as_bytes())?;
+    }
+    pen.figures.details = kept;
+    Ok(pen.figures)
+}
+
+/// The names of the enlarged details by scene, as an earlier report wrote them down.
+fn kept_details(dir: &Path) -> BTreeMap<String, Vec<String>> {
+    let mut kept: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    let text = std::fs::read_to_string(details_path(dir)).unwrap_or_default();
+    for (scene, name) in text.lines().filter_map(|line| line.split_once(": ")) {
+        kept.entry(scene.to_owned()).or_default().push(name.to_owned());
+    }
+    kept
+}
+
+/// The strips of one scene. Where its images are not here, figures of an earlier report stay, and with them what was found in
+/// those images.
+fn draw_pictures(
+    dir: &Path,
+    summary: &Summary,
+    set: &PictureSet,
+    pen: &mut Pen,
+    kept: &mut BTreeMap<String, Vec<String>>,
+) -> Result<()> {
+    let scene = &summary.scenes[set.scene].name;
+    let name = |sort: &str| of_scene(sort, scene);
+    match pictured::strips(dir, summary, set) {
+        Ok(strips) => {
+            pen.raster(&name("reference"), Ok(strips.whole))?;
+            for (sort, strip) in [("details", strips.details), ("equal-time", strips.equal_time)] {
+                match strip {
+                    Some(strip) => pen.raster(&name(sort), Ok(strip))?,
+                    None => pen.remove(&name(sort))?,
                 }
-                pen.raster("errors", Ok(strips.errors))?;
-                pen.figures.details = strips.names.into_iter().map(str::to_owned).collect();
-                // Too large for a repository: they lie with the images.
-                for (name, picture) in strips.whole_pictures {
-                    picture.write(&dir.join("images").join("flip").join(format!("{name}.png")))?;
-                }
-                write_whole(&details_path(dir), pen.figures.details.join("\n").as_bytes())?;
             }
-            Err(e) => {
-                // What the kept strips show was found in images that are not here: it was written down beside them.
-                let names = std::fs::read_to_string(details_path(dir)).ok();
-                let had_none = names.as_ref().is_some_and(|names| names.trim().is_empty());
-                for name in
-                    ["reference", "details", "errors"].into_iter().filter(|&name| !(had_none && name == "details"))
-                {
-                    pen.raster(name, Err(e.to_string()))?;
-                }
-                pen.figures.details = names.unwrap_or_default().lines().map(str::to_owned).collect();
+            pen.raster(&name("errors"), Ok(strips.errors))?;
+            kept.remove(scene);
+            if !strips.names.is_empty() {
+                kept.insert(scene.clone(), strips.names.into_iter().map(str::to_owned).collect());
+            }
+            // Too large for a repository: they lie with the images.
+            for (file, picture) in strips.whole_pictures {
+                picture.write(
+                    &dir.join("images/flip")
+                        .join(of_scene("", scene).trim_start_matches('-'))
+                        .join(format!("{file}.png")),
+                )?;
+            }
+        }
+        Err(e) => {
+            for sort in ["reference", "errors"] {
+                pen.raster(&name(sort), Err(e.to_string()))?;
+            }
+            for sort in ["details", "equal-time"] {
+                pen.keep(&name(sort));
             }
         }
     }
-    Ok(pen.figures)
+    Ok(())
 }
 
 /// Writes figures and keeps book of them.
@@ -160,6 +200,22 @@ impl Pen {
         let svg = provenance::stamped_svg(&figure.svg, &self.stamp);
         write_whole(&self.folder.join(format!("{name}.svg")), svg.as_bytes())?;
         self.raster(name, Ok(figure.raster))
+    }
+
+    /// Keeps the file of an earlier report, if there is one.
+    fn keep(&mut self, name: &str) {
+        if self.folder.join(format!("{name}.png")).exists() {
+            self.figures.set(name, FigureState::Kept);
+        }
+    }
+
+    /// Takes away the file of an earlier report that this one has no use for.
+    fn remove(&self, name: &str) -> Result<()> {
+        let path = self.folder.join(format!("{name}.png"));
+        match std::fs::remove_file(&path) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::write(&path, e)),
+            _ => Ok(()),
+        }
     }
 
     /// Writes a raster, or says why there is none and whether an earlier one was kept.

@@ -3,7 +3,7 @@
 use crate::sampling::{Order, Points, Preset};
 
 use super::super::evidence::{Answer, Limit, below};
-use super::super::markdown::{Page, link_to};
+use super::super::markdown::{Page, link_to, table_ref};
 use super::super::numbers::{listed, signed_estimate};
 use super::super::summarise::{Cell, Summary};
 use super::correlation::patterns;
@@ -73,7 +73,7 @@ fn uniform_line(summary: &Summary, uniform: usize) -> Option<String> {
         _ => "disadvantage: slow",
     };
     Some(format!(
-        "{right} (in {}, {}); {slow}{}: at {spp} spp {better} of {others} others have a smaller error. See {}. {}",
+        "{right} (in {}: {}); {slow}{}: at {spp} spp {better} of {others} others have a smaller error ({}). {}",
         scene_name(summary, scene),
         bias_short(cell),
         slope.unwrap_or_default(),
@@ -111,14 +111,22 @@ fn gain(summary: &Summary, sampler: usize) -> Option<String> {
         (_, 0) => "no advantage over uniform is seen",
         _ => "advantage in some scenes",
     };
+    // Of many scenes the ends alone: the table has them all.
+    let mut order: Vec<usize> = (0..ratios.len()).collect();
+    if ratios.len() > 3 {
+        order.sort_by(|&a, &b| ratios[a].1.value.total_cmp(&ratios[b].1.value));
+        order = vec![order[0], order[ratios.len() - 1]];
+    }
     let told: Vec<String> =
-        ratios.iter().map(|(scene, ratio)| format!("{} {}", scene_name(summary, *scene), times(ratio))).collect();
+        order.iter().map(|&i| format!("{} in {}", times(&ratios[i].1), scene_name(summary, ratios[i].0))).collect();
+    let shown: Vec<&Cell> = order.iter().map(|&i| cells[i]).collect();
+    let told = if ratios.len() > 3 { told.join(" to ") } else { listed(&told) };
     (!ratios.is_empty()).then(|| {
         format!(
-            "{words}: {} at {spp} spp has an RMSE, over uniform's, of {}. {}",
+            "{words}: at {spp} spp the RMSE of {}, over uniform's, is {told} ({}). {}",
             name(summary, sampler),
-            told.join(", "),
-            rows(&cells)
+            table_ref("against-uniform"),
+            rows(&shown)
         )
     })
 }
@@ -151,8 +159,8 @@ fn literal(summary: &Summary, points: Points) -> Option<String> {
     }
     let (who, link) = (name(summary, sheet), link_to(titles::DECISIONS));
     Some(match parts.as_slice() {
-        [] => format!("Read literally, {who}, no wrong limit and no stall is seen at {to} spp; see {link}."),
-        parts => format!("Disadvantage: read literally, {who}, it {} at {to} spp; see {link}.", parts.join(" and ")),
+        [] => format!("Read literally ({who}) no wrong limit and no stall is seen at {to} spp ({link})."),
+        parts => format!("Disadvantage: read literally ({who}) it {} at {to} spp ({link}).", parts.join(" and ")),
     })
 }
 
@@ -175,7 +183,7 @@ fn identical(summary: &Summary, scene: usize) -> Option<String> {
         n => format!("by their noise, and {n} of them by a bias that stays"),
     };
     Some(format!(
-        "**Identical?** {} samplers' images of {} at {most} spp: {words} (pixel digests), {why}; see {}.",
+        "**Identical?** {} samplers' images of {} at {most} spp: {words} (pixel digests), {why} ({}).",
         found.images,
         scene_name(summary, scene),
         link_to(titles::IDENTICAL)
@@ -202,7 +210,7 @@ fn helps(summary: &Summary, scene: usize) -> Option<String> {
     };
     Some(format!(
         "**Independent or correlated?** Only uniform's are independent. Within a set, points that keep apart are correlated: {words}. Smallest RMSE over uniform's in {} at \
-         {spp} spp: {} {} {ids}{}; see {}.",
+         {spp} spp: {} {} {ids}{} ({}).",
         scene_name(summary, scene),
         name(summary, best.0),
         times(&best.1),

@@ -3,7 +3,7 @@
 use crate::stats::{Estimate, IntervalKind};
 
 use super::super::evidence::{Answer, above, below};
-use super::super::markdown::Page;
+use super::super::markdown::{Page, link_to, table_ref};
 use super::super::numbers::{counted, estimate, listed, percent, short, signed_estimate};
 use super::super::summarise::{SLOPE_COUNTS, Slope, Summary};
 use super::super::write::Figures;
@@ -17,7 +17,7 @@ const INDEPENDENT: f64 = -0.5;
 fn slope_cell(slope: Option<&Slope>) -> String {
     let Some(fit) = slope.and_then(|slope| slope.fit.as_ref()) else { return "–".to_owned() };
     let star = if fit.interval == IntervalKind::Residuals { "*" } else { "" };
-    format!("{}{star}, {}", signed_estimate(&slope_estimate(fit)), counted(fit.points, "point", "points"))
+    format!("{}{star} ({})", signed_estimate(&slope_estimate(fit)), fit.points)
 }
 
 fn slope_estimate(fit: &crate::stats::SlopeFit) -> Estimate {
@@ -28,8 +28,10 @@ fn slope_estimate(fit: &crate::stats::SlopeFit) -> Estimate {
 pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
     page.heading(2, titles::CONVERGENCE);
     let caption = format!(
-        "RMSE against samples per pixel taken, {} with 95 % bands; thin lines: slopes −1/2 and −1; dotted: the reference's own noise.",
-        counted(summary.about.experiment.replicates as usize, "replicate", "replicates")
+        "RMSE in W/(m² sr) against samples per pixel taken, a panel a scene; {} with 95 % bands; thin lines: slopes −1/2 and −1; dotted: the reference's own noise. \
+         The numbers are in {}.",
+        counted(summary.about.experiment.replicates as usize, "replicate", "replicates"),
+        table_ref("rmse")
     );
     show(page, figures, "convergence", true, &caption);
     let mut head = vec!["slope of RMSE".to_owned()];
@@ -44,7 +46,7 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
         .collect();
     let (low, high) = (SLOPE_COUNTS.start(), SLOPE_COUNTS.end());
     let caption = format!(
-        "Slope of log RMSE in log spp (no unit), powers of two from {low} to {high} that the sampler takes as asked, and the number of points of the fit; {}.",
+        "Slope of log RMSE in log spp (no unit), powers of two from {low} to {high} that the sampler takes as asked, in brackets the number of counts fitted; {}.",
         level(summary)
     );
     tabulate(page, "slopes", &caption, &head, &lines);
@@ -117,8 +119,11 @@ pub fn bias_and_variance(summary: &Summary, figures: &Figures, page: &mut Page) 
     page.heading(2, titles::BIAS);
     let Some(most) = summary.most_spp() else { return };
     let caption = format!(
-        "Bias² and variance at {most} spp with 95 % intervals; what reaches the left edge is not told apart from 0. What each does as samples are \
-         added is in the tables of \"Between decisions\"."
+        "Bias² and variance at {most} spp in (W/(m² sr))², a group a scene, {} with 95 % intervals; what reaches the left edge is not told apart from 0. What each does \
+         as samples are added is in {}; the numbers are in {}.",
+        counted(summary.about.experiment.replicates as usize, "replicate", "replicates"),
+        link_to(titles::DECISIONS),
+        table_ref("bias")
     );
     show(page, figures, "bias-and-variance", true, &caption);
     let lines: Vec<Vec<String>> = (0..summary.scenes.len())

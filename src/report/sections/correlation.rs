@@ -1,18 +1,20 @@
 //! Decisions in step, and one pattern in every pixel.
 
+use crate::experiment::spec::Pictures;
 use crate::sampling::{Order, Random, SamplerSpec, Scope};
 use crate::stats::Estimate;
 
 use super::super::evidence::{Answer, Limit, above, below, ratio};
-use super::super::markdown::Page;
+use super::super::markdown::{Page, link_to};
 use super::super::numbers::{estimate, listed, percent, short, signed, signed_estimate};
 use super::super::pairing;
+use super::super::shots::{PictureSet, Shot};
 use super::super::summarise::{Cell, Summary};
-use super::titles;
 use super::words::{
-    against_one, bias_words, estimate_cell, limit_words, name, ratio_cell, rmse_ratio, row, rows, scene_name,
+    against_one, bias_words, estimate_cell, level, limit_words, name, ratio_cell, rmse_ratio, row, rows, scene_name,
     scenes_by_lens, times,
 };
+use super::{tabulate, tabulate_folded, titles};
 
 /// The literal reading against its cure.
 pub fn between_decisions(summary: &Summary, page: &mut Page) {
@@ -29,11 +31,19 @@ pub fn between_decisions(summary: &Summary, page: &mut Page) {
     );
     pairing_table(summary, page);
     let (with, without) = scenes_by_lens(summary);
-    for &scene in with.iter().chain(&without) {
-        scene_block(summary, scene, &pairs, page);
+    let scenes: Vec<usize> = with.iter().chain(&without).copied().collect();
+    literal_table(summary, &scenes, &pairs, page);
+    let found: Vec<String> = scenes.iter().flat_map(|&scene| scene_sentences(summary, scene, &pairs)).collect();
+    if found.is_empty() && summary.course_counts().is_some() {
+        page.paragraph("In no scene is a wrong limit or a stall of the literal reading seen.");
     }
+    page.bullets(&found);
+    page.sentences(&[control_sentence(summary, &scenes).unwrap_or_default()]);
     if with.is_empty() {
         page.paragraph("No scene of this experiment has a lens, so what decisions in step do to one was not measured.");
+    }
+    for &scene in &scenes {
+        course_table(summary, scene, page);
     }
 }
 
@@ -45,11 +55,10 @@ fn pairing_table(summary: &Summary, page: &mut Page) {
     if measured.is_empty() {
         return;
     }
-    page.paragraph(&format!(
+    page.paragraph(
         "The smallest case, straight from the samplers and without a renderer: the mean of ‖u − v‖², u and v the points of two decisions of one pixel. \
-         Its truth is 1/3. Each of {} replicates gives one mean; below are their mean with its 95 % interval and their spread (standard deviation).",
-        pairing::REPLICATES
-    ));
+         Its truth is 1/3.",
+    );
     let head: Vec<String> = std::iter::once("sampler".to_owned())
         .chain(pairing::COUNTS.iter().flat_map(|n| [format!("mean, n = {n}"), format!("spread, n = {n}")]))
         .collect();
@@ -60,7 +69,11 @@ fn pairing_table(summary: &Summary, page: &mut Page) {
             std::iter::once(name(summary, *sampler)).chain(cells).collect()
         })
         .collect();
-    page.table(&head.iter().map(String::as_str).collect::<Vec<_>>(), &lines);
+    let caption = format!(
+        "Mean of ‖u − v‖² (no unit) over the n points of two decisions: mean of {} replicates with its 95 % interval, and their spread (standard deviation).",
+        pairing::REPLICATES
+    );
+    tabulate(page, "two-decisions", &caption, &head, &lines);
     let wrong: Vec<String> = measured
         .iter()
         .filter(|(_, values)| values.last().is_some_and(pairing::Paired::is_wrong))
@@ -90,13 +103,65 @@ fn pairing_table(summary: &Summary, page: &mut Page) {
     page.sentences(&sentences);
 }
 
-/// The table of one scene and what it says.
-fn scene_block(summary: &Summary, scene: usize, pairs: &[(usize, usize)], page: &mut Page) {
+/// The literal reading of every family beside its cure, scene by scene: one line each.
+fn literal_table(summary: &Summary, scenes: &[usize], pairs: &[(usize, usize)], page: &mut Page) {
     let Some((from, to)) = summary.course_counts() else {
         return page.paragraph("One count of samples tells no course of an error.");
     };
-    let lens = if summary.scenes[scene].lens { "with a lens" } else { "without a lens" };
-    page.heading(4, &format!("{} ({lens})", summary.scenes[scene].name));
+    let lines: Vec<Vec<String>> = scenes
+        .iter()
+        .flat_map(|&scene| pairs.iter().filter_map(move |&(sheet, best)| literal_row(summary, scene, sheet, best)))
+        .collect();
+    let border = scenes.iter().find_map(|&scene| summary.course(scene, summary.uniform()?));
+    let border = border.map_or(String::new(), |c| {
+        format!(
+            " Independent samples make RMSE {to} / {from} = {}; what stays above {} is called staying.",
+            short(c.independent),
+            short(c.border())
+        )
+    });
+    let caption = format!(
+        "Decisions in step against decisions kept apart, at {to} spp: where the error of the literal reading goes from {from} to {to} spp, its bias² in (W/(m² sr))², \
+         and its RMSE over that of the same family's `:best`; {}.{border}",
+        level(summary)
+    );
+    let ratio = format!("RMSE {to} / {from}");
+    let head = ["scene", "in step", "so it", &ratio, "bias²", "kept apart", "RMSE in step / apart", "so that", "rows"];
+    tabulate(page, "literal", &caption, &head, &lines);
+}
+
+fn literal_row(summary: &Summary, scene: usize, sheet: usize, best: usize) -> Option<Vec<String>> {
+    let (_, to) = summary.course_counts()?;
+    let (literal, cured) = (summary.cell(scene, sheet, to)?, summary.cell(scene, best, to)?);
+    let course = summary.course(scene, sheet);
+    let gain = rmse_ratio(literal, cured);
+    let verdict = match gain.as_ref().map(against_one) {
+        Some("more") => "kept apart is better",
+        Some("less") => "kept apart is no cure",
+        _ => "cannot tell",
+    };
+    Some(vec![
+        scene_name(summary, scene),
+        name(summary, sheet),
+        course.map_or("cannot tell: not above the reference's noise", |course| limit_words(&course)).to_owned(),
+        ratio_cell(course.map(|course| course.rmse_ratio)),
+        estimate(&literal.bias2),
+        name(summary, best),
+        ratio_cell(gain),
+        verdict.to_owned(),
+        format!("{} {}", row(&literal.id), row(&cured.id)),
+    ])
+}
+
+/// What a scene's literal readings do wrong, what cures it, and the control.
+fn scene_sentences(summary: &Summary, scene: usize, pairs: &[(usize, usize)]) -> Vec<String> {
+    let failures = pairs.iter().filter_map(|&(sheet, best)| literal_sentence(summary, scene, sheet, best));
+    failures.chain(shuffle_sentence(summary, scene, pairs)).collect()
+}
+
+/// The course of every sampler's error in one scene.
+fn course_table(summary: &Summary, scene: usize, page: &mut Page) {
+    let Some((from, to)) = summary.course_counts() else { return };
     let lines: Vec<Vec<String>> =
         (0..summary.samplers.len()).filter_map(|sampler| course_row(summary, scene, sampler, from, to)).collect();
     let head = [
@@ -109,18 +174,13 @@ fn scene_block(summary: &Summary, scene: usize, pairs: &[(usize, usize)], page: 
         "so it".to_owned(),
         "row".to_owned(),
     ];
-    page.table(&head.iter().map(String::as_str).collect::<Vec<_>>(), &lines);
-    let border = summary.uniform().and_then(|uniform| summary.course(scene, uniform));
-    let border = border
-        .map(|c| format!("Independent samples make it {}; the border is {}.", short(c.independent), short(c.border())));
-    page.sentences(&[border.unwrap_or_default()]);
-    let items: Vec<String> =
-        pairs.iter().filter_map(|&(sheet, best)| literal_sentence(summary, scene, sheet, best)).collect();
-    page.bullets(&items);
-    page.sentences(&[shuffle_sentence(summary, scene, pairs).unwrap_or_default()]);
-    if let Some(uniform) = summary.uniform() {
-        page.sentences(&[control_sentence(summary, scene, uniform).unwrap_or_default()]);
-    }
+    let at = scene_name(summary, scene);
+    let caption = format!(
+        "Where every sampler's error goes in {at} from {from} to {to} spp: RMSE in W/(m² sr), bias² in its square, ratios of RMSE and variance; {}.",
+        level(summary)
+    );
+    let key = format!("course-{}", summary.scenes[scene].name);
+    tabulate_folded(page, &key, &format!("All samplers in {}", summary.scenes[scene].name), &caption, &head, &lines);
 }
 
 fn course_row(summary: &Summary, scene: usize, sampler: usize, from: u32, to: u32) -> Option<Vec<String>> {
@@ -139,21 +199,15 @@ fn course_row(summary: &Summary, scene: usize, sampler: usize, from: u32, to: u3
     ])
 }
 
-/// What happened to the literal reading of one family in one scene, and whether keeping decisions apart cured it.
+/// The wrong limit or the stall of one family's literal reading in one scene, and whether keeping decisions apart cured it;
+/// `None` where neither is seen: the table says all of it.
 pub fn literal_sentence(summary: &Summary, scene: usize, sheet: usize, best: usize) -> Option<String> {
     let (from, to) = summary.course_counts()?;
     let (literal, cured) = (summary.cell(scene, sheet, to)?, summary.cell(scene, best, to)?);
-    let (sheet_name, best_name, at) = (name(summary, sheet), name(summary, best), scene_name(summary, scene));
-    let Some(course) = summary.course(scene, sheet) else {
-        let cure = cure_words(literal, cured, &best_name);
-        return Some(format!(
-            "{sheet_name} in {at}: an error is not above the reference's noise, so its course cannot be told. {cure} {}",
-            rows(&[literal, cured])
-        ));
-    };
+    let (sheet_name, at) = (name(summary, sheet), scene_name(summary, scene));
+    let course = summary.course(scene, sheet)?;
     let kept = times(&course.rmse_ratio);
-    let mean = summary.scenes[scene].reference.as_ref().map(|r| r.mean);
-    let bias = bias_words(literal, mean);
+    let bias = bias_words(literal, summary.scenes[scene].reference.as_ref().map(|r| r.mean));
     let what = match course.limit() {
         Limit::Wrong => format!(
             "**{sheet_name} converges to a wrong image in {at}**: from {from} to {to} spp its RMSE stays at {kept} of what it was and its bias² at {}, with {bias}",
@@ -167,17 +221,9 @@ pub fn literal_sentence(summary: &Summary, scene: usize, sheet: usize, best: usi
                 "**{sheet_name} stalls in {at}**: from {from} to {to} spp its RMSE stays at {kept} of what it was{variance}; {bias}"
             )
         }
-        Limit::Falls if course.is_biased() == Answer::Yes => {
-            format!(
-                "{sheet_name} in {at}: the error falls to {kept} from {from} to {to} spp, but there is a bias: {bias}"
-            )
-        }
-        Limit::Falls => format!("{sheet_name} in {at}: the error falls to {kept} from {from} to {to} spp; {bias}"),
-        Limit::Unclear => format!(
-            "{sheet_name} in {at}: from {from} to {to} spp the RMSE changes by {kept}: cannot tell where it goes; {bias}"
-        ),
+        Limit::Falls | Limit::Unclear => return None,
     };
-    Some(format!("{what}. {} {}", cure_words(literal, cured, &best_name), rows(&[literal, cured])))
+    Some(format!("{what}. {} {}", cure_words(literal, cured, &name(summary, best)), rows(&[literal, cured])))
 }
 
 /// What the cure makes of the error.
@@ -215,29 +261,37 @@ fn shuffle_sentence(summary: &Summary, scene: usize, pairs: &[(usize, usize)]) -
         .collect();
     (!parts.is_empty()).then(|| {
         format!(
-            "**Shuffling cures {}**: the same points, in an order of its own for each decision.",
+            "**In {} shuffling cures {}**: the same points, in an order of its own for each decision.",
+            scene_name(summary, scene),
             parts.join(" and ")
         )
     })
 }
 
 /// Uniform sampling as the control: its decisions are independent however they march.
-fn control_sentence(summary: &Summary, scene: usize, uniform: usize) -> Option<String> {
+fn control_sentence(summary: &Summary, scenes: &[usize]) -> Option<String> {
+    let uniform = summary.uniform()?;
     let (from, to) = summary.course_counts()?;
-    let (course, cell) = (summary.course(scene, uniform)?, summary.cell(scene, uniform, to)?);
-    let mean = summary.scenes[scene].reference.as_ref().map(|r| r.mean);
-    let fits = match (below(&course.rmse_ratio, course.independent), above(&course.rmse_ratio, course.independent)) {
-        (Answer::CannotTell, Answer::CannotTell) => "not told apart from what independent samples do",
-        (Answer::Yes, _) => "faster than independent samples do",
-        _ => "more slowly than independent samples do",
-    };
+    let told: Vec<String> = scenes
+        .iter()
+        .filter_map(|&scene| {
+            let (course, cell) = (summary.course(scene, uniform)?, summary.cell(scene, uniform, to)?);
+            let ratio = &course.rmse_ratio;
+            let fits = match (below(ratio, course.independent), above(ratio, course.independent)) {
+                (Answer::CannotTell, Answer::CannotTell) => "not told apart from it",
+                (Answer::Yes, _) => "below it",
+                _ => "above it",
+            };
+            Some(format!("{} {}, {fits} {}", scene_name(summary, scene), times(ratio), rows(&[cell])))
+        })
+        .collect();
+    let independent =
+        scenes.iter().find_map(|&scene| summary.course(scene, uniform)).map(|course| course.independent)?;
     Some(format!(
-        "The control, {}: its numbers are independent in any order; its RMSE goes to {} of what it was from {from} to {to} spp, {fits} ({}); {}. {}",
+        "The control, {}: its numbers are independent in any order, so from {from} to {to} spp its RMSE should go to {} of what it was. It goes to: {}.",
         name(summary, uniform),
-        times(&course.rmse_ratio),
-        short(course.independent),
-        bias_words(cell, mean),
-        rows(&[cell])
+        short(independent),
+        told.join("; ")
     ))
 }
 
@@ -280,7 +334,7 @@ impl Pattern<'_> {
 /// The count that patterns are judged at: the pictures', else the middle one.
 pub fn pattern_spp(summary: &Summary) -> Option<u32> {
     let e = &summary.about.experiment;
-    let pictured = e.pictures.as_ref().map(|pictures| pictures.spp).filter(|spp| e.spp.contains(spp));
+    let pictured = e.pictures.first().map(Pictures::equal_spp).filter(|spp| e.spp.contains(spp));
     pictured.or(summary.middle_spp())
 }
 
@@ -310,16 +364,15 @@ pub fn between_pixels(summary: &Summary, page: &mut Page) {
         .collect();
     page.paragraph(&format!(
         "ρ is the correlation between the errors of neighbouring pixels at {spp} spp. A sampler that shows every pixel the same points (or one axis of them) may make neighbours err \
-         alike: then noise becomes structure, which the eye sees more readily and which does not average out over an area (right column: spread of the whole \
-         image's mean between replicates)."
+         alike: then noise becomes structure, which the eye sees more readily and which does not average out over an area."
     ));
-    neighbours_table(summary, spp, page);
     if all.is_empty() {
         page.paragraph("No sampler of this experiment shows every pixel the same points beside one that does not.");
     }
-    let items: Vec<String> = all.iter().map(|(scene, pattern)| pattern_sentence(summary, *scene, pattern)).collect();
-    page.bullets(&items);
+    page.sentences(&pattern_sentences(summary, &all));
+    pattern_table(summary, spp, &all, page);
     picture_correlations(summary, page);
+    neighbours_table(summary, spp, page);
 }
 
 /// ρ of every sampler in every scene.
@@ -347,63 +400,96 @@ fn neighbours_table(summary: &Summary, spp: u32, page: &mut Page) {
             ])
         })
         .collect();
-    page.table(&["scene", "sampler", "points", "ρ", "RMSE", "spread of the mean", "row"], &lines);
+    let caption = format!(
+        "Correlation ρ of neighbouring pixels' errors (no unit) and RMSE at {spp} spp, and the spread (standard deviation) of the whole image's mean between replicates; \
+         RMSE and spread in W/(m² sr); {}.",
+        level(summary)
+    );
+    let head = ["scene", "sampler", "points", "ρ", "RMSE", "spread of the mean", "row"];
+    tabulate_folded(page, "neighbours", "ρ of every sampler in every scene", &caption, &head, &lines);
 }
 
-fn pattern_sentence(summary: &Summary, scene: usize, p: &Pattern) -> String {
-    let (own, other, at) = (name(summary, p.sampler), name(summary, p.twin), scene_name(summary, scene));
-    let rho = |cell: &Cell| cell.error_autocorrelation.map_or("undefined".to_owned(), |rho| signed_estimate(&rho));
-    let verdict = match p.errs_alike() {
-        Answer::Yes => format!("**In {at} neighbours err more alike under {own}**"),
-        Answer::No => format!("In {at} neighbours err less alike under {own} than under {other}"),
-        Answer::CannotTell => format!("Whether neighbours err more alike in {at} under {own} cannot be told"),
+/// Where neighbours err more alike, where less, and where it cannot be told.
+fn pattern_sentences(summary: &Summary, all: &[(usize, Pattern)]) -> Vec<String> {
+    let of = |answer: Answer| {
+        let found = all.iter().filter(|(_, p)| p.errs_alike() == answer);
+        let told: Vec<String> = found
+            .map(|(scene, p)| {
+                let rho = p.cell.error_autocorrelation.map_or("undefined".to_owned(), |rho| signed_estimate(&rho));
+                format!("{} in {} (ρ = {rho})", name(summary, p.sampler), scene_name(summary, *scene))
+            })
+            .collect();
+        (!told.is_empty()).then(|| listed(&told))
     };
-    let error = rmse_ratio(p.cell, p.other).map_or(String::new(), |ratio| {
-        let words = match against_one(&ratio) {
-            "less" => "at a smaller RMSE",
-            "more" => "at a larger RMSE",
-            _ => "at an RMSE that is not told apart",
-        };
-        format!(", {words} (ratio {})", times(&ratio))
-    });
-    let step = summary.samplers[p.sampler].spec().is_some_and(|spec| spec.order == Order::Step);
-    let step = if step { " Its decisions are in step, too." } else { "" };
-    let mut text =
-        format!("{verdict}: ρ = {}, {other} {}{error}.{step} {}", rho(p.cell), rho(p.other), rows(&[p.cell, p.other]));
-    if let Some(first) = text.get(..1).map(str::to_uppercase) {
-        text.replace_range(..1, &first);
-    }
-    text
+    [
+        of(Answer::Yes).map(|list| format!("**Neighbours err more alike** under {list}.")),
+        of(Answer::No).map(|list| format!("They err less alike than under the sampler compared with for {list}.")),
+        of(Answer::CannotTell).map(|list| format!("It cannot be told for {list}.")),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+/// One pattern in every pixel beside a new one in each: one line a sampler and scene.
+fn pattern_table(summary: &Summary, spp: u32, all: &[(usize, Pattern)], page: &mut Page) {
+    let rho = |cell: &Cell| cell.error_autocorrelation.map_or("undefined".to_owned(), |rho| signed_estimate(&rho));
+    let lines: Vec<Vec<String>> = all
+        .iter()
+        .map(|(scene, p)| {
+            let in_step = summary.samplers[p.sampler].spec().is_some_and(|spec| spec.order == Order::Step);
+            let verdict = match p.errs_alike() {
+                Answer::Yes => "more alike",
+                Answer::No => "less alike",
+                Answer::CannotTell => "cannot tell",
+            };
+            vec![
+                scene_name(summary, *scene),
+                name(summary, p.sampler),
+                rho(p.cell),
+                name(summary, p.twin),
+                rho(p.other),
+                verdict.to_owned(),
+                ratio_cell(rmse_ratio(p.cell, p.other)),
+                if in_step { "yes" } else { "no" }.to_owned(),
+                format!("{} {}", row(&p.cell.id), row(&p.other.id)),
+            ]
+        })
+        .collect();
+    let caption = format!(
+        "Samplers that show every pixel the same points, or one axis of them, beside the nearest that does not, at {spp} spp: correlation ρ of neighbouring pixels' errors (no unit), \
+         whether neighbours err more alike, the ratio of the two RMSE, and whether decisions march in step, which makes neighbours err alike, too; {}.",
+        level(summary)
+    );
+    let head =
+        ["scene", "sampler", "its ρ", "compared with", "its ρ", "neighbours err", "ratio of RMSE", "in step", "rows"];
+    tabulate(page, "patterns", &caption, &head, &lines);
 }
 
 /// The same on the larger pictures: one image each, so no interval.
 fn picture_correlations(summary: &Summary, page: &mut Page) {
-    let of = |sampler: usize| {
-        let row = summary.pictures.iter().find(|row| row.sampler == summary.samplers[sampler].canonical)?;
-        Some((sampler, row, row.errors.as_ref()?.error_autocorrelation?))
-    };
-    let (same, new): (Vec<_>, Vec<_>) = (0..summary.samplers.len())
-        .filter_map(of)
-        .partition(|(sampler, ..)| summary.samplers[*sampler].repeats_in_every_pixel());
-    if same.is_empty() {
-        return;
-    }
-    let told = |list: &[(usize, &crate::experiment::results::ImageRow, f64)]| {
-        let items: Vec<String> = list
+    let told = |set: &PictureSet| {
+        let repeats = |shot: &&&Shot| summary.samplers[shot.sampler].repeats_in_every_pixel();
+        let rho = |shot: &Shot| shot.row.errors.as_ref()?.error_autocorrelation;
+        let items: Vec<String> = set
+            .at_equal_spp()
             .iter()
-            .map(|(sampler, image, rho)| {
-                format!("{} {} (row {})", name(summary, *sampler), signed(*rho), row(&image.id))
+            .filter(repeats)
+            .filter_map(|shot| {
+                Some(format!("{} {} (row {})", name(summary, shot.sampler), signed(rho(shot)?), row(&shot.row.id)))
             })
             .collect();
-        listed(&items)
+        let (at, size) = (scene_name(summary, set.scene), set.pictures.size);
+        (!items.is_empty()).then(|| format!("{at} at {size} pixels {}", listed(&items)))
     };
-    let size = summary.pictures.first().map(|row| row.size.to_string()).unwrap_or_default();
-    let others =
-        if new.is_empty() { String::new() } else { format!(" With new points in each pixel: {}.", told(&new)) };
-    page.paragraph(&format!(
-        "On the pictures ({size}, one image each, so without intervals): {}.{others}",
-        told(&same)
-    ));
+    let told: Vec<String> = summary.pictured.iter().filter_map(told).collect();
+    if !told.is_empty() {
+        page.paragraph(&format!(
+            "ρ under the same points in every pixel, on the pictures (one image each, so without intervals; the others are in {}): {}.",
+            link_to(titles::PICTURES),
+            told.join("; ")
+        ));
+    }
 }
 
 /// Standard deviation; none of fewer than two values.

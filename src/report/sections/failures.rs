@@ -6,10 +6,12 @@ use super::super::evidence::{Answer, Limit, below, clearly_above_one, interpolat
 use super::super::markdown::{Page, link_to};
 use super::super::numbers::{counted, estimate, listed, percent, short, signed_estimate};
 use super::super::summarise::{Cell, Summary};
-use super::correlation::{pattern_spp, patterns};
+use super::correlation::{Pattern, pattern_spp, patterns};
 use super::speed::efficiency;
-use super::titles;
-use super::words::{bias_words, limit_words, name, ratio_cell, rmse_ratio, row, rows, same_as_cell, scene_name, times};
+use super::words::{
+    bias_words, level, limit_words, name, ratio_cell, rmse_ratio, row, same_as_cell, scene_name, times,
+};
+use super::{tabulate, titles};
 
 /// An error at a count that is no power of two, over what its neighbours promise.
 pub struct OddCount {
@@ -37,37 +39,31 @@ pub fn odd_count(summary: &Summary, scene: usize, sampler: usize) -> Option<OddC
 /// The section: every item is a failure that the rows show.
 pub fn section(summary: &Summary, page: &mut Page) {
     page.heading(2, titles::FAILURES);
-    let mut items = Vec::new();
+    let pairs: Vec<(usize, usize)> = (0..summary.scenes.len())
+        .flat_map(|scene| (0..summary.samplers.len()).map(move |sampler| (scene, sampler)))
+        .collect();
+    let mut lines: Vec<Vec<String>> =
+        pairs.iter().filter_map(|&(scene, sampler)| course_failure(summary, scene, sampler)).collect();
     for scene in 0..summary.scenes.len() {
-        for sampler in 0..summary.samplers.len() {
-            items.extend(course_failure(summary, scene, sampler));
-        }
+        let alike = patterns(summary, scene);
+        lines
+            .extend(alike.iter().filter(|p| p.errs_alike() == Answer::Yes).map(|p| pattern_failure(summary, scene, p)));
     }
-    for scene in 0..summary.scenes.len() {
-        for pattern in patterns(summary, scene).iter().filter(|pattern| pattern.errs_alike() == Answer::Yes) {
-            items.push(format!(
-                "{} in {}: structure instead of noise, see {}. {}",
-                name(summary, pattern.sampler),
-                scene_name(summary, scene),
-                link_to(titles::PIXELS),
-                rows(&[pattern.cell])
-            ));
-        }
-    }
-    for scene in 0..summary.scenes.len() {
-        for sampler in 0..summary.samplers.len() {
-            items.extend(odd_failure(summary, scene, sampler));
-        }
-    }
-    if items.is_empty() {
+    lines.extend(pairs.iter().filter_map(|&(scene, sampler)| odd_failure(summary, scene, sampler)));
+    if lines.is_empty() {
         page.paragraph("No failure is seen in these rows: no error stays, no bias is seen, no neighbours err alike, no odd count costs accuracy.");
     }
-    page.bullets(&items);
+    let caption = format!(
+        "Every failure that the rows show: what happens, and the number that says so (bias² in (W/(m² sr))²); {}. The counts of a verdict are in {}.",
+        level(summary),
+        link_to(titles::READING)
+    );
+    tabulate(page, "failures", &caption, &["failure", "sampler", "scene", "measured", "row"], &lines);
     stability(summary, page);
 }
 
 /// A wrong limit, a stall, or a bias beside a falling error.
-fn course_failure(summary: &Summary, scene: usize, sampler: usize) -> Option<String> {
+fn course_failure(summary: &Summary, scene: usize, sampler: usize) -> Option<Vec<String>> {
     let (from, to) = summary.course_counts()?;
     let (course, cell) = (summary.course(scene, sampler)?, summary.cell(scene, sampler, to)?);
     let is_failure = match course.limit() {
@@ -78,30 +74,42 @@ fn course_failure(summary: &Summary, scene: usize, sampler: usize) -> Option<Str
     };
     let mean = summary.scenes[scene].reference.as_ref().map(|r| r.mean);
     is_failure.then(|| {
-        format!(
-            "{} in {}: {} (RMSE {to} / {from} spp = {}; {}). {}",
+        vec![
+            limit_words(&course).to_owned(),
             name(summary, sampler),
             scene_name(summary, scene),
-            limit_words(&course),
-            times(&course.rmse_ratio),
-            bias_words(cell, mean),
-            rows(&[cell])
-        )
+            format!("RMSE {to} / {from} spp = {}; {}", times(&course.rmse_ratio), bias_words(cell, mean)),
+            row(&cell.id),
+        ]
     })
 }
 
-fn odd_failure(summary: &Summary, scene: usize, sampler: usize) -> Option<String> {
+/// One pattern in every pixel that makes neighbours err alike.
+fn pattern_failure(summary: &Summary, scene: usize, pattern: &Pattern) -> Vec<String> {
+    let rho = pattern.cell.error_autocorrelation.map_or("undefined".to_owned(), |rho| signed_estimate(&rho));
+    vec![
+        "structure instead of noise".to_owned(),
+        name(summary, pattern.sampler),
+        scene_name(summary, scene),
+        format!("ρ = {rho} at {} spp", pattern.cell.spp.asked),
+        row(&pattern.cell.id),
+    ]
+}
+
+fn odd_failure(summary: &Summary, scene: usize, sampler: usize) -> Option<Vec<String>> {
     let odd = odd_count(summary, scene, sampler).filter(|odd| clearly_above_one(&odd.ratio))?;
     let cell = summary.cell(scene, sampler, odd.asked)?;
-    Some(format!(
-        "{} in {} at {} spp ({} taken): its RMSE is {} times what the powers of two around it promise. {}",
+    Some(vec![
+        format!("an odd count costs accuracy: {} spp", odd.asked),
         name(summary, sampler),
         scene_name(summary, scene),
-        odd.asked,
-        odd.taken,
-        times(&odd.ratio),
-        rows(&[cell])
-    ))
+        format!(
+            "RMSE at {} spp taken = {} times what the powers of two around it promise",
+            odd.taken,
+            times(&odd.ratio)
+        ),
+        row(&cell.id),
+    ])
 }
 
 /// How far replicates are apart.
@@ -121,10 +129,13 @@ fn stability(summary: &Summary, page: &mut Page) {
             std::iter::once(name(summary, sampler)).chain(cells).collect()
         })
         .collect();
-    let mut head = vec![format!("largest / smallest RMSE of the replicates, {spp} spp")];
+    let mut head = vec!["sampler".to_owned()];
     head.extend((0..summary.scenes.len()).map(|scene| scene_name(summary, scene)));
-    page.paragraph("How stable each is from one randomisation to the next:");
-    page.table(&head.iter().map(String::as_str).collect::<Vec<_>>(), &lines);
+    let caption = format!(
+        "How stable each is from one randomisation to the next: largest over smallest RMSE of {} at {spp} spp (no unit).",
+        counted(summary.about.experiment.replicates as usize, "replicate", "replicates")
+    );
+    tabulate(page, "spread", &caption, &head, &lines);
 }
 
 /// The table of advantages and disadvantages: every cell a measured predicate.
@@ -132,8 +143,8 @@ pub fn table(summary: &Summary, page: &mut Page) {
     page.heading(2, titles::TABLE);
     page.paragraph("Every cell is computed from rows; none is an opinion. \"yes\" below: the error falls and no bias is seen, within the interval given.");
     let scenes: Vec<String> = (0..summary.scenes.len()).map(|scene| scene_name(summary, scene)).collect();
-    let per_scene = |title: String, cell: &dyn Fn(usize, usize) -> String, page: &mut Page| {
-        let mut head = vec![title];
+    let per_scene = |key: &str, caption: String, cell: &dyn Fn(usize, usize) -> String, page: &mut Page| {
+        let mut head = vec!["sampler".to_owned()];
         head.extend(scenes.iter().cloned());
         let lines: Vec<Vec<String>> = (0..summary.samplers.len())
             .map(|sampler| {
@@ -142,15 +153,24 @@ pub fn table(summary: &Summary, page: &mut Page) {
                 std::iter::once(name(summary, sampler)).chain(cells).collect()
             })
             .collect();
-        page.table(&head.iter().map(String::as_str).collect::<Vec<_>>(), &lines);
+        tabulate(page, key, &caption, &head, &lines);
     };
     if let Some((_, to)) = summary.course_counts() {
-        let title = format!("converges to the right image? (bias² at {to} spp)");
-        per_scene(title, &|scene, sampler| right_image(summary, scene, sampler, to), page);
+        let caption = format!(
+            "Does it converge to the right image? In brackets bias² in (W/(m² sr))² at {to} spp; {}.",
+            level(summary)
+        );
+        per_scene("right-image", caption, &|scene, sampler| right_image(summary, scene, sampler, to), page);
     }
     if let (Some(uniform), Some(spp)) = (summary.uniform(), summary.middle_spp()) {
-        let title = format!("RMSE at {spp} spp / uniform's");
-        per_scene(title, &|scene, sampler| against_uniform(summary, scene, sampler, uniform, spp), page);
+        let caption =
+            format!("RMSE at {spp} spp over uniform sampling's (below 1 is better, no unit); {}.", level(summary));
+        per_scene(
+            "against-uniform",
+            caption,
+            &|scene, sampler| against_uniform(summary, scene, sampler, uniform, spp),
+            page,
+        );
     }
     others(summary, page);
 }
@@ -211,7 +231,7 @@ fn others(summary: &Summary, page: &mut Page) {
         })
         .collect();
     let head = [
-        format!("in {at}"),
+        "sampler".to_owned(),
         format!(
             "RMSE at {} spp / that promised by its neighbours",
             odd_asked.map_or("an odd count of".to_owned(), |n| n.to_string())
@@ -220,7 +240,12 @@ fn others(summary: &Summary, page: &mut Page) {
         format!("ρ of neighbours, {} spp", pattern.unwrap_or(0)),
         "1/(MSE · T), relative to uniform (this machine)".to_owned(),
     ];
-    page.table(&head.iter().map(String::as_str).collect::<Vec<_>>(), &lines);
+    let caption = format!(
+        "What else tells them apart, in {at}: odd counts, randomness, correlation ρ of neighbouring pixels' errors, and efficiency at {} spp (T: seconds × threads; above 1 is better); {}.",
+        summary.middle_spp().unwrap_or(0),
+        level(summary)
+    );
+    tabulate(page, "others", &caption, &head, &lines);
 }
 
 /// Efficiency at the middle count, over uniform sampling's.
@@ -258,15 +283,10 @@ pub fn limits(summary: &Summary, page: &mut Page) {
             "Seconds are medians of few images on a machine that may have had other work; efficiencies move with them from run to run, errors do not.".to_owned(),
         );
     }
-    if !summary.pictures.is_empty() {
-        items.push(format!(
-            "{} shown once each; a single picture is an example, not a measurement.",
-            if summary.pictures.len() == 1 {
-                "The picture is".to_owned()
-            } else {
-                format!("{} pictures are", summary.pictures.len())
-            }
-        ));
+    let shots: usize = summary.pictured.iter().map(|set| set.shots.len()).sum();
+    if shots > 0 {
+        let words = if shots == 1 { "The picture is".to_owned() } else { format!("{shots} pictures are") };
+        items.push(format!("{words} shown once each; a single picture is an example, not a measurement."));
     }
     items.push(format!(
         "{} at small sizes: other scenes, sizes and lenses may rank the samplers otherwise.",

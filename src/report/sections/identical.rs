@@ -9,8 +9,8 @@ use super::super::evidence::Limit;
 use super::super::markdown::{Page, link_to};
 use super::super::numbers::{counted, listed, signed_estimate};
 use super::super::summarise::{Cell, Summary};
-use super::titles;
-use super::words::{main_scene, name, row, scene_name};
+use super::words::{level, main_scene, name, row, scene_name};
+use super::{tabulate_folded, titles};
 
 /// Means count as equal in practice within this share of the mean radiance.
 pub const EQUIVALENT: f64 = 0.01;
@@ -93,44 +93,54 @@ pub fn section(summary: &Summary, page: &mut Page) {
         "Different bytes need not mean different pictures: two unbiased samplers differ by noise alone and agree ever better as samples are added. So the \
          means are compared, too.",
     );
-    for scene in 0..summary.scenes.len() {
-        means(summary, scene, most, page);
-    }
+    let sentences: Vec<String> = (0..summary.scenes.len())
+        .map(|scene| {
+            let cells: Vec<&Cell> = (0..summary.samplers.len()).filter_map(|i| summary.cell(scene, i, most)).collect();
+            means_sentences(summary, scene, &cells).join(" ").trim_end().to_owned()
+        })
+        .collect();
+    page.bullets(&sentences);
     page.paragraph(&format!(
-        "Error of the mean: mean signed error in percent of the reference's mean radiance. \"Within {} %\" asks the whole interval. p: Welch's test of the \
-         replicates' means against uniform sampling's, Holm-adjusted over the samplers of the scene; – where there is one replicate. Pictures of equal mean \
-         may still differ in where they err: {} and {}.",
-        100.0 * EQUIVALENT,
+        "Pictures of equal mean may still differ in where they err: {} and {}.",
         link_to(titles::BIAS),
         link_to(titles::PIXELS)
     ));
+    means_table(summary, most, page);
 }
 
-fn means(summary: &Summary, scene: usize, most: u32, page: &mut Page) {
+/// The mean of every sampler in every scene.
+fn means_table(summary: &Summary, most: u32, page: &mut Page) {
+    let lines: Vec<Vec<String>> = (0..summary.scenes.len()).flat_map(|scene| means(summary, scene, most)).collect();
+    let within = format!("within {} %", 100.0 * EQUIVALENT);
+    let caption = format!(
+        "Error of the mean at {most} spp: mean signed error in percent of the reference's mean radiance; \"{within}\" asks the whole interval. p: Welch's test of the \
+         replicates' means against uniform sampling's, Holm-adjusted over the samplers of a scene, – where there is one replicate; {}.",
+        level(summary)
+    );
+    let head = ["scene", "sampler", "error of the mean (%)", &within, "p", "row"];
+    tabulate_folded(page, "means", "The means and their tests", &caption, &head, &lines);
+}
+
+fn means(summary: &Summary, scene: usize, most: u32) -> Vec<Vec<String>> {
     let cells: Vec<&Cell> = (0..summary.samplers.len()).filter_map(|i| summary.cell(scene, i, most)).collect();
     let p_values = p_values(summary, &cells);
     let percent = |e: Estimate| {
         let scaled = Estimate { value: 100.0 * e.value, ci95: e.ci95.map(|ends| ends.map(|end| 100.0 * end)) };
         signed_estimate(&scaled)
     };
-    let lines: Vec<Vec<String>> = cells
-        .iter()
-        .map(|cell| {
-            let bias = relative_bias(summary, cell);
-            vec![
-                name(summary, cell.sampler),
-                bias.map_or("–".to_owned(), percent),
-                bias.map_or("cannot tell", |bias| equivalent(&bias)).to_owned(),
-                p_values
-                    .get(&cell.sampler)
-                    .map_or("–".to_owned(), |p| if *p < 0.001 { "< 0.001".into() } else { format!("{p:.3}") }),
-                row(&cell.id),
-            ]
-        })
-        .collect();
-    let title = format!("{}, {most} spp", scene_name(summary, scene));
-    page.table(&[&title, "error of the mean (%)", &format!("within {} %", 100.0 * EQUIVALENT), "p", "row"], &lines);
-    page.sentences(&means_sentences(summary, scene, &cells));
+    let line = |cell: &&Cell| {
+        let bias = relative_bias(summary, cell);
+        let p = p_values.get(&cell.sampler);
+        vec![
+            scene_name(summary, scene),
+            name(summary, cell.sampler),
+            bias.map_or("–".to_owned(), percent),
+            bias.map_or("cannot tell", |bias| equivalent(&bias)).to_owned(),
+            p.map_or("–".to_owned(), |p| if *p < 0.001 { "< 0.001".into() } else { format!("{p:.3}") }),
+            row(&cell.id),
+        ]
+    };
+    cells.iter().map(line).collect()
 }
 
 /// Which means agree, and whether one hides a wrong image.

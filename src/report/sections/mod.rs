@@ -15,6 +15,7 @@
 //!   after, become `Figure 3` and `Table 5` with a link; [`link_to`](super::markdown::link_to)`(titles::…)` names a section.
 
 mod answers;
+mod budgets;
 mod convergence;
 mod correlation;
 mod decisions;
@@ -34,6 +35,7 @@ use super::write::{FigureState, Figures};
 
 /// Names of sections that others link to.
 mod titles {
+    pub const READING: &str = "How to read it";
     pub const WITHIN: &str = "Within a set";
     pub const DECISIONS: &str = "Between decisions";
     pub const PIXELS: &str = "Between pixels";
@@ -41,6 +43,7 @@ mod titles {
     pub const IDENTICAL: &str = "Identical";
     pub const CONVERGENCE: &str = "Convergence";
     pub const BIAS: &str = "Bias and variance";
+    pub const PICTURES: &str = "Pictures at equal samples and at equal time";
     pub const SPEED: &str = "Speed against accuracy";
     pub const FAILURES: &str = "Where methods fail";
     pub const STABILITY: &str = "Stability";
@@ -53,8 +56,8 @@ mod titles {
 pub fn report(summary: &Summary, figures: &Figures) -> String {
     let mut page = Page::new();
     opening::title(summary, &mut page);
-    page.contents();
     answers::section(summary, &mut page);
+    page.contents();
     opening::what_was_run(summary, &mut page);
     opening::how_to_read(summary, &mut page);
     opening::scenes_and_samplers(summary, &mut page);

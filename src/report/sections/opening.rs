@@ -1,14 +1,14 @@
 //! What was run, how to read it, scenes and samplers.
 
 use crate::experiment::spec::Estimators;
-use crate::sampling::Decision;
+use crate::sampling::{Decision, SamplerSet};
 
 use super::super::markdown::{Page, link_to};
 use super::super::numbers::{counted, listed, short};
 use super::super::provenance;
 use super::super::summarise::{SLOPE_COUNTS, Summary};
 use super::words::name;
-use super::{tabulate, titles};
+use super::{tabulate, tabulate_folded, titles};
 
 /// Title, provenance, and what is missing.
 pub fn title(summary: &Summary, page: &mut Page) {
@@ -53,14 +53,15 @@ pub fn what_was_run(summary: &Summary, page: &mut Page) {
             listed(&points.metrics.iter().map(|m| format!("`{m}`")).collect::<Vec<_>>())
         ));
     }
-    if let Some(pictures) = &e.pictures {
+    for pictures in &e.pictures {
+        let spp: Vec<String> = pictures.spp.iter().map(u32::to_string).collect();
         items.push(format!(
-            "Pictures: `{}` at {}, {} spp, compared with two halves of {} spp.",
-            pictures.scene, pictures.size, pictures.spp, pictures.reference_spp
+            "Pictures: `{}` at {}, {} spp, compared with two halves of {} spp or the closed form.",
+            pictures.scene,
+            pictures.size,
+            listed(&spp),
+            pictures.reference_spp
         ));
-    }
-    if !summary.about.notes.is_empty() {
-        items.push(format!("The plan's notes: {}.", summary.about.notes.join("; ")));
     }
     page.bullets(&items);
     page.paragraph("The one command that makes all of this again:");
@@ -69,6 +70,9 @@ pub fn what_was_run(summary: &Summary, page: &mut Page) {
         "Numbers behind every figure: [summary.csv](summary.csv), [slopes.csv](slopes.csv), [results.jsonl](results.jsonl) \
          (one line an item; rows are named by the first eight digits of their `id`).",
     );
+    let notes: Vec<String> = summary.about.notes.iter().map(|note| format!("{note}.")).collect();
+    let title = format!("What the plan made of the experiment ({})", counted(notes.len(), "note", "notes"));
+    page.folded(&title, |page| page.bullets(&notes));
 }
 
 fn estimator_words(estimators: Estimators) -> &'static str {
@@ -83,10 +87,13 @@ fn estimator_words(estimators: Estimators) -> &'static str {
 
 /// How to read the numbers.
 pub fn how_to_read(summary: &Summary, page: &mut Page) {
-    page.heading(2, "How to read it");
+    page.heading(3, titles::READING);
     let e = &summary.about.experiment;
     let (low, high) = (SLOPE_COUNTS.start(), SLOPE_COUNTS.end());
     page.bullets(&[
+        "spp: samples per pixel, asked for unless \"taken\" is said. Radiance and its errors are in W/(m² sr), squared errors in its square. Rows of \
+         `results.jsonl` are named by eight digits."
+            .to_owned(),
         "`[low, high]` is a 95 % interval over independent replicates (each a whole image under a randomisation of its \
          own), with the reference's own noise in it. Ratios combine the intervals of both sides (MOVER on logarithms). \
          An interval that holds both answers is written \"cannot tell\"."
@@ -117,7 +124,7 @@ pub fn how_to_read(summary: &Summary, page: &mut Page) {
 
 /// The tables of scenes and samplers.
 pub fn scenes_and_samplers(summary: &Summary, page: &mut Page) {
-    page.heading(2, "Scenes and samplers");
+    page.heading(3, "Scenes and samplers");
     let rows: Vec<Vec<String>> = summary
         .scenes
         .iter()
@@ -143,15 +150,26 @@ pub fn scenes_and_samplers(summary: &Summary, page: &mut Page) {
                    square, RMSE) in W/(m² sr).";
     tabulate(page, "scenes", caption, &head, &rows);
     let rows: Vec<Vec<String>> = (0..summary.samplers.len()).map(|i| sampler_row(summary, i)).collect();
-    let caption = "Samplers: the full form of each name, what it means, and the samples per pixel that it takes where 26 are asked for.";
-    tabulate(
-        page,
-        "samplers",
-        caption,
-        &["sampler", "stands for", "what it does", "random", "takes where 26 are asked"],
-        &rows,
-    );
+    let caption = "Samplers: the full form of each name (points:order:randomisation@scope), whether another seed gives another set, and the samples per pixel that it takes \
+                   where 26 are asked for.";
+    tabulate(page, "samplers", caption, &["sampler", "stands for", "random", "takes where 26 are asked"], &rows);
+    let rows: Vec<Vec<String>> = (0..summary.samplers.len())
+        .filter_map(|i| Some(vec![name(summary, i), what_it_does(summary.samplers[i].set.as_ref()?)]))
+        .collect();
+    let head = ["sampler", "what it does"];
+    tabulate_folded(page, "what-it-does", "What each sampler does, in words", "What each sampler does.", &head, &rows);
     page.paragraph(&format!("What each is good for: {}.", link_to(titles::TABLE)));
+}
+
+/// A sampler in words; of a set with a sampler for each decision which decisions read another one.
+fn what_it_does(set: &SamplerSet) -> String {
+    match set.single() {
+        Some(spec) => spec.describe(),
+        None => format!(
+            "A sampler for each decision: all read the first but {}.",
+            listed(&set.majority().1.iter().map(|d| format!("the {}", d.name())).collect::<Vec<_>>())
+        ),
+    }
 }
 
 fn sampler_row(summary: &Summary, i: usize) -> Vec<String> {
@@ -163,28 +181,18 @@ fn sampler_row(summary: &Summary, i: usize) -> Vec<String> {
         }
     };
     let Some(set) = &sampler.set else {
-        return vec![
-            names,
-            format!("`{}`", sampler.canonical),
-            "unknown here".into(),
-            "unknown".into(),
-            "unknown".into(),
-        ];
+        return vec![names, format!("`{}`", sampler.canonical), "unknown here".into(), "unknown".into()];
     };
     let is_random = Decision::ALL.iter().any(|&decision| set.of(decision).is_random());
     let random = if is_random { "yes" } else { "no" };
     let taken = Decision::ALL.iter().filter(|d| d.dimensions() == 2).map(|&d| set.of(d).taken(26)).max().unwrap_or(26);
-    let (most, odd) = set.majority();
-    let exceptions: Vec<String> = odd.iter().map(|&d| format!("{}: {}", d.name(), set.of(d).expansion())).collect();
-    let (meaning, describe) = match set.single() {
-        Some(spec) => (spec.expansion(), spec.describe()),
-        None => (
-            format!("{}; {}", most.expansion(), exceptions.join("; ")),
-            format!(
-                "A sampler for each decision: all read the first but {}.",
-                listed(&odd.iter().map(|d| format!("the {}", d.name())).collect::<Vec<_>>())
-            ),
-        ),
+    let meaning = match set.single() {
+        Some(spec) => format!("`{}`", spec.expansion()),
+        None => {
+            let (most, odd) = set.majority();
+            let odd: Vec<String> = odd.iter().map(|&d| format!("{}: `{}`", d.name(), set.of(d).expansion())).collect();
+            format!("`{}`; {}", most.expansion(), odd.join("; "))
+        }
     };
-    vec![names, meaning, describe, random.to_owned(), taken.to_string()]
+    vec![names, meaning, random.to_owned(), taken.to_string()]
 }

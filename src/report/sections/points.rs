@@ -65,8 +65,11 @@ pub fn discrepancy(summary: &Summary, figures: &Figures, page: &mut Page) {
         "Star discrepancy D*: the largest gap between the share of points in a box at the origin and the box's area, exact. \
          Smaller is more even.",
     );
-    let caption = "Star discrepancy of the points of one decision against their number, mean over independent sets with 95 % bands.";
-    show(page, figures, "discrepancy", true, caption);
+    let caption = format!(
+        "Star discrepancy D* (no unit) of the points of one decision against their number n, mean of {} with 95 % bands; thin lines: slopes −1/2 and −1.",
+        sets_measured(summary)
+    );
+    show(page, figures, "discrepancy", true, &caption);
     let shown: Vec<u32> = {
         let mut counts: Vec<u32> =
             summary.about.experiment.points.as_ref().map_or(Vec::new(), |points| points.n.clone());

@@ -2,15 +2,15 @@
 
 use crate::stats::Estimate;
 
-use super::super::charts::speed_name;
-use super::super::evidence::{interpolated, ratio, ratio_of_roots};
+use super::super::charts::of_scene;
+use super::super::evidence::ratio;
 use super::super::markdown::Page;
-use super::super::numbers::{counted, estimate, listed, short};
+use super::super::numbers::{counted, estimate, listed};
 use super::super::pareto::pareto_front;
 use super::super::summarise::{Cell, Speed, Summary};
 use super::super::write::Figures;
 use super::words::{name, ratio_cell, row, scene_name};
-use super::{show, titles};
+use super::{budgets, show, tabulate_folded, titles};
 
 /// The section.
 pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
@@ -25,27 +25,27 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
     threads.dedup();
     page.paragraph(&format!(
         "Seconds are this machine's: {} timed on {} threads, wall seconds of rendering alone. Other work on the machine \
-         moves them; they are no part of `summary.csv`. Seconds and rates below: median and range. Efficiency 1/(MSE · T) is in 1/(radiance² · thread-seconds), its interval from the \
-         range of T and the 95 % interval of the MSE. RMSE at equal seconds: what uniform sampling takes at the count of the tables, between the neighbouring counts of each \
-         sampler on a straight line of logarithms, values and interval ends alike; the spread of the seconds is not in those intervals.",
+         moves them; they are no part of `summary.csv`.",
         counted(images, "image", "images"),
         listed(&threads)
     ));
+    budgets::section(summary, page);
     for scene in 0..summary.scenes.len() {
         let scene_file = &summary.scenes[scene].name;
         let caption = format!(
-            "`{}`: median seconds an image against RMSE, one mark a sampler and count, on the front by name; bars: range of the seconds and 95 % interval of the RMSE.",
-            scene_file
+            "Speed against accuracy in `{scene_file}`, {} pixels: median seconds an image against RMSE in W/(m² sr), one mark a sampler and count, those on the front by name; bars: range of \
+             the seconds and 95 % interval of the RMSE, {}.",
+            summary.scenes[scene].size,
+            counted(summary.about.experiment.replicates as usize, "replicate", "replicates")
         );
-        show(page, figures, &speed_name(scene_file), true, &caption);
+        show(page, figures, &of_scene("speed", scene_file), true, &caption);
         page.sentences(&[front_sentence(summary, scene).unwrap_or_default()]);
         efficiency_table(summary, scene, page);
-        equal_seconds(summary, scene, page);
     }
 }
 
 /// Cells of a scene with a time and an error above 0.
-fn timed(summary: &Summary, scene: usize) -> Vec<(&Cell, &Speed)> {
+pub fn timed(summary: &Summary, scene: usize) -> Vec<(&Cell, &Speed)> {
     let cells = (0..summary.samplers.len()).flat_map(|sampler| summary.cells_of(scene, sampler));
     cells
         .filter(|cell| cell.rmse.is_some_and(|rmse| rmse.value > 0.0))
@@ -122,47 +122,22 @@ fn efficiency_table(summary: &Summary, scene: usize, page: &mut Page) {
         })
         .collect();
     let head = [
-        format!("{}, {spp} spp", scene_name(summary, scene)),
+        "sampler".to_owned(),
         "seconds".to_owned(),
         "M samples/s".to_owned(),
         "1/(MSE · T)".to_owned(),
         "relative to uniform".to_owned(),
         "row".to_owned(),
     ];
-    page.table(&head.iter().map(String::as_str).collect::<Vec<_>>(), &lines);
+    let scene_file = &summary.scenes[scene].name;
+    let caption = format!(
+        "Seconds an image of `{scene_file}` at {spp} spp and millions of samples per second, median and range; efficiency 1/(MSE · T) in 1/((W/(m² sr))² · thread-seconds), its interval \
+         from the range of T and the 95 % interval of the MSE; the same over uniform sampling's."
+    );
+    let key = of_scene("efficiency", scene_file);
+    tabulate_folded(page, &key, &format!("Seconds and efficiency in {scene_file}"), &caption, &head, &lines);
 }
 
 fn inverse(e: &Estimate) -> Estimate {
     Estimate { value: 1.0 / e.value, ci95: e.ci95.map(|[low, high]| [1.0 / high, 1.0 / low]) }
-}
-
-/// RMSE that each sampler reaches in equal seconds, between its counts on a straight line of logarithms.
-fn equal_seconds(summary: &Summary, scene: usize, page: &mut Page) {
-    let (Some(uniform), Some(spp)) = (summary.uniform(), summary.middle_spp()) else { return };
-    let Some(budget) = summary.cell(scene, uniform, spp).and_then(|cell| summary.speed(cell)) else { return };
-    let budget = budget.seconds.value;
-    let all = timed(summary, scene);
-    let reached: Vec<(usize, Estimate)> = (0..summary.samplers.len())
-        .filter_map(|sampler| {
-            let trials: Vec<(f64, Estimate)> = all
-                .iter()
-                .filter(|(cell, _)| cell.sampler == sampler)
-                .map(|(cell, speed)| (speed.seconds.value, cell.mse))
-                .collect();
-            Some((sampler, interpolated(&trials, budget)?))
-        })
-        .collect();
-    let base = reached.iter().find(|(sampler, _)| *sampler == uniform).map(|(_, mse)| *mse);
-    let lines: Vec<Vec<String>> = reached
-        .iter()
-        .map(|(sampler, mse)| {
-            let root = |x: f64| x.max(0.0).sqrt();
-            let rmse = Estimate { value: root(mse.value), ci95: mse.ci95.map(|ends| ends.map(root)) };
-            let relative = base.and_then(|base| ratio_of_roots(mse, &base));
-            let relative = if *sampler == uniform { "1".to_owned() } else { ratio_cell(relative) };
-            vec![name(summary, *sampler), estimate(&rmse), relative]
-        })
-        .collect();
-    let title = format!("{} in {} s", scene_name(summary, scene), short(budget));
-    page.table(&[&title, "RMSE at equal seconds", "relative to uniform"], &lines);
 }
