@@ -13,7 +13,10 @@ use sampler_lab::scene::light::LightSet;
 use sampler_lab::scene::load::{OpenOptions, open};
 
 /// The scenes' names: `data/NAME/NAME.obj`.
-const SCENES: [&str; 3] = ["checkerpots", "cornell", "penumbra"];
+const SCENES: [&str; 6] = ["checkerpots", "cornell", "penumbra", "bokeh", "many-lights", "horizon"];
+
+/// Those lit by one rectangle.
+const ONE_LIGHT: [&str; 3] = ["checkerpots", "cornell", "penumbra"];
 
 /// The folder of committed scenes.
 fn data() -> PathBuf {
@@ -113,7 +116,7 @@ fn making_the_scenes_again_gives_the_committed_bytes() {
     let folder = tempfile::tempdir().unwrap();
     generate::write_all(folder.path()).unwrap();
     let (made, committed) = (files(folder.path()), files(&data()));
-    assert_eq!(made.len(), 8);
+    assert_eq!(made.len(), 15);
     for (path, bytes) in &made {
         assert!(committed.get(path) == Some(bytes), "{}: run `cargo run --example make_scenes`", path.display());
     }
@@ -287,8 +290,8 @@ fn the_floor_alternates_and_reaches_tiles_smaller_than_a_pixel() {
 }
 
 #[test]
-fn each_light_is_one_parallelogram_that_faces_down() {
-    for scene in SCENES {
+fn each_single_light_is_one_parallelogram_that_faces_down() {
+    for scene in ONE_LIGHT {
         let objects = objects(scene);
         let lights: Vec<_> = objects.iter().filter(|o| o.material == "light").collect();
         assert_eq!(lights.len(), 1, "{scene}");

@@ -13,7 +13,7 @@ use super::teapot::Teapot;
 const ABOUT: &str = "Teapots on a marble floor, y up. The teapot is Martin Newell's (1975), tessellated from its published control points.
 Made by examples/make_scenes.";
 
-const MATERIALS: [Material; 8] = [
+const MATERIALS: [Material<'static>; 8] = [
     Material { name: "tile_pale", lines: "Kd 1 1 1\nmap_Kd marble_pale.png" },
     Material { name: "tile_dark", lines: "Kd 1 1 1\nmap_Kd marble_dark.png" },
     Material { name: "teapot_diffuse", lines: "Kd 0.56 0.155 0.06" },

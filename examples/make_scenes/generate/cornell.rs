@@ -28,7 +28,7 @@ struct Quad {
 const ABOUT: &str = "Cornell box, the published measurements times 0.01; the ceiling is whole and the light hangs
 0.001 below it. Made by examples/make_scenes.";
 
-const MATERIALS: [Material; 4] = [
+const MATERIALS: [Material<'static>; 4] = [
     Material { name: "white", lines: "Kd 0.725 0.71 0.68" },
     Material { name: "red", lines: "Kd 0.63 0.065 0.05" },
     Material { name: "green", lines: "Kd 0.14 0.45 0.091" },

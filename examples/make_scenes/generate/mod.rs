@@ -1,7 +1,10 @@
 //! The scenes: what stands in them, and how they become OBJ, MTL and PNG files.
 
+pub mod bokeh;
 pub mod checkerpots;
 pub mod cornell;
+pub mod horizon;
+pub mod many_lights;
 pub mod marble;
 pub mod obj;
 pub mod penumbra;
@@ -19,5 +22,8 @@ use sampler_lab::error::Result;
 pub fn write_all(folder: &Path) -> Result<()> {
     checkerpots::write(&folder.join("checkerpots"))?;
     cornell::write(&folder.join("cornell"))?;
-    penumbra::write(&folder.join("penumbra"))
+    penumbra::write(&folder.join("penumbra"))?;
+    bokeh::write(&folder.join("bokeh"))?;
+    many_lights::write(&folder.join("many-lights"))?;
+    horizon::write(&folder.join("horizon"))
 }

@@ -21,11 +21,11 @@ pub struct Corner {
 
 /// A diffuse material as an MTL file says it.
 #[derive(Debug, Clone, Copy)]
-pub struct Material {
+pub struct Material<'a> {
     /// Name after `newmtl`.
-    pub name: &'static str,
+    pub name: &'a str,
     /// Lines after it.
-    pub lines: &'static str,
+    pub lines: &'a str,
 }
 
 /// An OBJ file under construction.
@@ -140,7 +140,7 @@ impl Obj {
     ///
     /// # Errors
     /// Kind `Write` where a file cannot be written.
-    pub fn write(&self, folder: &Path, name: &str, about: &str, materials: &[Material]) -> Result<()> {
+    pub fn write(&self, folder: &Path, name: &str, about: &str, materials: &[Material<'_>]) -> Result<()> {
         let Self { vertices, uvs, normals, faces, .. } = self;
         let header = about.lines().map(|line| format!("# {line}\n")).collect::<String>();
         let obj = format!("{header}mtllib {name}.mtl\n{}{}{}{faces}", vertices.text, uvs.text, normals.text);

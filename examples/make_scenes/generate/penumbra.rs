@@ -13,7 +13,7 @@ use super::obj::{Material, Obj};
 const ABOUT: &str = "A square light over a plane, one straight blocker between; both are outside the picture.
 Made by examples/make_scenes.";
 
-const MATERIALS: [Material; 3] = [
+const MATERIALS: [Material<'static>; 3] = [
     Material { name: "plane", lines: "Kd 0.75 0.75 0.75" },
     Material { name: "blocker", lines: "Kd 0.5 0.5 0.5" },
     Material { name: "light", lines: "Kd 1 1 1\nKe 10 10 10" },

@@ -1,0 +1,106 @@
+//! `many-lights`: a hall of pillars with 72 lamps whose powers fall over four and a half orders of magnitude.
+
+use std::path::Path;
+
+use glam::DVec3;
+use sampler_lab::error::Result;
+
+use super::marble::mix;
+use super::obj::{Material, Obj};
+
+const ABOUT: &str =
+    "A hall of pillars under 72 lamps, each a light of its own; lamp i has 10^(-4.5 i/71) of the strongest one's power.
+Made by examples/make_scenes.";
+
+const SURFACES: [Material<'static>; 3] = [
+    Material { name: "floor", lines: "Kd 0.6 0.58 0.54" },
+    Material { name: "wall", lines: "Kd 0.55 0.5 0.45" },
+    Material { name: "pillar", lines: "Kd 0.7 0.68 0.64" },
+];
+
+/// Number of lamps.
+const LAMPS: u32 = 72;
+
+/// Orders of magnitude between the strongest and the weakest lamp.
+const DECADES: f64 = 4.5;
+
+/// The hall reaches from −HALF to HALF in x, from 0 to DEPTH in z.
+const HALF: f64 = 8.0;
+const DEPTH: f64 = 16.0;
+const HEIGHT: f64 = 7.0;
+
+/// Writes the scene's files into `folder`.
+///
+/// # Errors
+/// Kind `Write` where a file cannot be written.
+pub fn write(folder: &Path) -> Result<()> {
+    let mut obj = Obj::new(4);
+    add_hall(&mut obj);
+    add_pillars(&mut obj);
+    let lamps: Vec<(String, String)> = (0..LAMPS).map(|i| add_lamp(&mut obj, i)).collect();
+    let lamps = lamps.iter().map(|(name, lines)| Material { name, lines });
+    obj.write(folder, "many-lights", ABOUT, &SURFACES.into_iter().chain(lamps).collect::<Vec<_>>())
+}
+
+fn add_hall(obj: &mut Obj) {
+    let at = DVec3::new;
+    obj.object("floor", "floor");
+    obj.flat_quad([at(-HALF, 0.0, -4.0), at(-HALF, 0.0, DEPTH), at(HALF, 0.0, DEPTH), at(HALF, 0.0, -4.0)]);
+    obj.object("walls", "wall");
+    obj.flat_quad([at(-HALF, 0.0, DEPTH), at(-HALF, HEIGHT, DEPTH), at(HALF, HEIGHT, DEPTH), at(HALF, 0.0, DEPTH)]);
+    obj.flat_quad([at(-HALF, 0.0, -4.0), at(-HALF, HEIGHT, -4.0), at(-HALF, HEIGHT, DEPTH), at(-HALF, 0.0, DEPTH)]);
+    obj.flat_quad([at(HALF, 0.0, -4.0), at(HALF, 0.0, DEPTH), at(HALF, HEIGHT, DEPTH), at(HALF, HEIGHT, -4.0)]);
+}
+
+/// Pillars in rows, some broken off.
+fn add_pillars(obj: &mut Obj) {
+    obj.object("pillars", "pillar");
+    for row in 0..5 {
+        for column in 0..5 {
+            let (x, z) = (f64::from(column) * 3.0 - 6.0, 1.6 + 3.0 * f64::from(row));
+            let height = [4.0, 1.0, 3.0, 2.0][mix(16 + 5 * row + column) as usize % 4];
+            add_box(obj, DVec3::new(x, 0.0, z), 0.4, height);
+        }
+    }
+}
+
+/// An upright box without a bottom on the floor at `foot`.
+fn add_box(obj: &mut Obj, foot: DVec3, half: f64, height: f64) {
+    let at = |x: f64, y: f64, z: f64| foot + DVec3::new(x * half, y * height, z * half);
+    let ring = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+    for i in 0..4 {
+        let ((ax, az), (bx, bz)) = (ring[i], ring[(i + 1) % 4]);
+        obj.flat_quad([at(ax, 0.0, az), at(ax, 1.0, az), at(bx, 1.0, bz), at(bx, 0.0, bz)]);
+    }
+    obj.flat_quad([at(-1.0, 1.0, -1.0), at(-1.0, 1.0, 1.0), at(1.0, 1.0, 1.0), at(1.0, 1.0, -1.0)]);
+}
+
+/// Adds lamp `i`, a square that looks down; its material's name and lines.
+///
+/// Side and height fall with the fourth root of the power, the emission with its square root: a weak lamp hangs low, and
+/// its pool of light is small and faint, but brighter than what the others leave there in a pillar's shadow.
+fn add_lamp(obj: &mut Obj, i: u32) -> (String, String) {
+    let power = libm::pow(10.0, -DECADES * f64::from(i) / f64::from(LAMPS - 1));
+    let root = power.sqrt();
+    let size = root.sqrt();
+    let (side, height) = (0.6 * size, 5.6 * size);
+    // Points of a rank-1 lattice: near each other in number, far from each other on the floor.
+    let unit = |step: f64, shift: f64| (f64::from(i) * step + shift).fract();
+    let (x, z) = ((2.0 * unit(0.754_877_666, 0.5) - 1.0) * 7.0, unit(0.569_840_291, 0.3) * 18.0 - 3.0);
+    let name = format!("lamp_{i:02}");
+    obj.object(&name, &name);
+    let half = side / 2.0;
+    let corner = |dx: f64, dz: f64| DVec3::new(x + dx * half, height, z + dz * half);
+    obj.flat_quad([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]);
+    let [r, g, b] = hue(f64::from(i) * 0.618_034, 0.25 + 0.6 * (1.0 - size));
+    let strength = 40.0 * root;
+    (name, format!("Kd {r:.3} {g:.3} {b:.3}\nKe {strength:.5} {strength:.5} {strength:.5}"))
+}
+
+/// A colour of luma near 1/2 on the wheel, `turn` in turns, between grey (0) and pure (1).
+fn hue(turn: f64, saturation: f64) -> [f64; 3] {
+    std::array::from_fn(|channel| {
+        let angle = std::f64::consts::TAU * (turn - channel as f64 / 3.0);
+        0.6 * (1.0 - saturation) + 0.6 * saturation * (0.5 + 0.5 * libm::cos(angle)) / 0.6
+    })
+}
