@@ -7,9 +7,11 @@
 //! | [`disk`] | irradiance from a disk light that faces the receiver, and the variance of one sample of it |
 //! | [`variance`] | variance of one uniform-area sample of a polygon light |
 //! | [`penumbra`] | the image of a soft shadow, pixel by pixel |
+//! | [`horizon`] | the image of a checkered plane that runs to the horizon, pixel by pixel |
 //! | [`camera`] | a pixel's coverage by an edge, the blur of a thin lens |
 pub mod camera;
 pub mod disk;
+pub mod horizon;
 pub mod penumbra;
 pub mod polygon;
 pub mod quadrature;
@@ -20,6 +22,7 @@ mod reference_tests;
 
 pub use camera::{ThinLens, disc_share, pixel_coverage};
 pub use disk::DiskLight;
+pub use horizon::{CheckeredPlane, Horizon};
 pub use penumbra::{DiffusePlane, Penumbra, Pinhole};
 pub use polygon::{PolygonLight, Receiver};
 pub use variance::variance_of_one_area_sample;

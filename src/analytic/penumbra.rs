@@ -58,14 +58,14 @@ pub struct Penumbra {
 
 /// View rays as an affine function of the image position: `corner + x · right + y · down`, not normalised.
 #[derive(Debug, Clone, Copy)]
-struct View {
-    corner: DVec3,
-    right: DVec3,
-    down: DVec3,
+pub(super) struct View {
+    pub(super) corner: DVec3,
+    pub(super) right: DVec3,
+    pub(super) down: DVec3,
 }
 
 impl View {
-    fn of(camera: &Pinhole) -> Self {
+    pub(super) fn of(camera: &Pinhole) -> Self {
         let forward = camera.direction.normalize();
         let right = forward.cross(camera.up).normalize();
         let up = right.cross(forward);
@@ -79,7 +79,7 @@ impl View {
         }
     }
 
-    fn ray(&self, x: f64, y: f64) -> DVec3 {
+    pub(super) fn ray(&self, x: f64, y: f64) -> DVec3 {
         self.corner + self.right * x + self.down * y
     }
 
@@ -317,7 +317,7 @@ fn expect(holds: bool, place: &str, expected: &str, found: impl std::fmt::Debug)
     Err(Error::input(format!("penumbra: {place}"), format!("expected {expected}, found {found:?}")))
 }
 
-fn check_camera(camera: &Pinhole) -> Result<()> {
+pub(super) fn check_camera(camera: &Pinhole) -> Result<()> {
     expect(camera.position.is_finite(), "camera.position", "finite numbers", camera.position)?;
     let across = camera.direction.cross(camera.up).length_squared();
     expect(across.is_finite() && across > 0.0, "camera.direction", "a direction other than up", camera.direction)?;

@@ -1,47 +1,142 @@
 //! Scenes whose every pixel is known in closed form, recognised by their numbers rather than by their name.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::backend::Size;
-use crate::analytic::penumbra::Penumbra;
+use crate::analytic::Horizon;
+use crate::analytic::penumbra::{Penumbra, Pinhole};
 use crate::error::Result;
 use crate::film::Image;
 use crate::scene::config::Shading;
 use crate::scene::load::LoadedScene;
-use crate::scene::mesh::{Material, Mesh};
+use crate::scene::mesh::{Material, Mesh, Texture};
 
 /// Raised whenever the bits of an exact image may change.
 pub const ALGORITHM: u32 = 1;
 
-/// The closed form of a scene, where the scene is the lab's `penumbra` number by number and the image shows its plane
-/// alone: an edited file has none.
-pub fn closed_form(loaded: &LoadedScene, size: Size) -> Option<Penumbra> {
-    // Images too wide for the plane alone are refused there.
-    let exact = Penumbra::standard(size.width, size.height).ok()?;
-    (has_its_camera(loaded, &exact) && has_its_surfaces(&loaded.mesh, &exact, size)).then_some(exact)
+/// A scene of which every pixel is known.
+#[derive(Debug)]
+pub enum ClosedForm {
+    /// The lab's `penumbra`.
+    Penumbra(Penumbra),
+    /// The lab's `horizon`, whose colours are its files'.
+    Horizon {
+        /// What is seen of the plane.
+        shape: Horizon,
+        /// Linear colours of the pale tile, the dark tile and the sky.
+        colours: [Vec3; 3],
+    },
 }
 
-/// The exact image, rounded once to `f32`; the scene is grey.
+/// The closed form of a scene, where the scene is one of the lab's number by number and the image shows nothing else: an
+/// edited file has none.
+pub fn closed_form(loaded: &LoadedScene, size: Size) -> Option<ClosedForm> {
+    penumbra(loaded, size).map(ClosedForm::Penumbra).or_else(|| {
+        let (shape, colours) = horizon(loaded, size)?;
+        Some(ClosedForm::Horizon { shape, colours })
+    })
+}
+
+/// The exact image, rounded once to `f32`.
 ///
 /// # Errors
 /// Kind `Input` where a pixel's quadrature does not reach its tolerance.
-pub fn image(exact: &Penumbra, size: Size) -> Result<Image> {
-    let pixels = exact.image()?.into_iter().map(|radiance| [radiance as f32; 3]).collect();
+pub fn image(exact: &ClosedForm, size: Size) -> Result<Image> {
+    let pixels = match exact {
+        ClosedForm::Penumbra(exact) => exact.image()?.into_iter().map(|radiance| [radiance as f32; 3]).collect(),
+        ClosedForm::Horizon { shape, colours } => {
+            let [pale, dark, sky] = colours.map(|colour| colour.as_dvec3().to_array());
+            let seen = shape.image()?.into_iter();
+            seen.map(|seen| std::array::from_fn(|c| seen.colour(pale[c], dark[c], sky[c]) as f32)).collect()
+        }
+    };
     Ok(Image { width: size.width, height: size.height, pixels })
 }
 
-/// A pinhole in the same place, looking the same way, at surfaces that are lit.
-fn has_its_camera(loaded: &LoadedScene, exact: &Penumbra) -> bool {
-    let (found, expected) = (&loaded.config.camera, exact.camera());
+fn penumbra(loaded: &LoadedScene, size: Size) -> Option<Penumbra> {
+    // Images too wide for the plane alone are refused there.
+    let exact = Penumbra::standard(size.width, size.height).ok()?;
+    let is_it = loaded.config.shading == Shading::Direct
+        && has_camera(loaded, exact.camera())
+        && has_its_surfaces(&loaded.mesh, &exact, size);
+    is_it.then_some(exact)
+}
+
+/// A pinhole in the same place, looking the same way.
+fn has_camera(loaded: &LoadedScene, expected: &Pinhole) -> bool {
+    let found = &loaded.config.camera;
     let frame = |dir: DVec3, up: DVec3| [dir.normalize(), dir.cross(up).normalize()];
     let found_frame = frame(found.dir.as_dvec3(), found.up.as_dvec3());
     let expected_frame = frame(expected.direction, expected.up);
-    loaded.config.shading == Shading::Direct
-        && found.lens_radius == 0.0
+    found.lens_radius == 0.0
         && f64::from(found.fov_degrees) == expected.fov_y_degrees
         && found.pos.as_dvec3() == expected.position
         // A direction may have any length: what the lengths' roundings leave is far below a pixel.
         && std::iter::zip(found_frame, expected_frame).all(|(a, b)| a.distance(b) < 1e-12)
+}
+
+/// The plane and its sky, shown as albedo; colours are free.
+fn horizon(loaded: &LoadedScene, size: Size) -> Option<(Horizon, [Vec3; 3])> {
+    // Images too wide for plane and sky are refused there.
+    let exact = Horizon::standard(size.width, size.height).ok()?;
+    if loaded.config.shading != Shading::Albedo || !has_camera(loaded, exact.camera()) {
+        return None;
+    }
+    let mesh = &loaded.mesh;
+    let [near, far, spread] = Horizon::STANDARD;
+    let quad = |corners: [[f64; 3]; 4]| corners.map(DVec3::from_array).to_vec();
+    let side = spread * far;
+    let mut parts = vec![Part::of(quad([[-side, 0.0, far], [side, 0.0, far], [side, far, far], [-side, far, far]]))];
+    // The plane's bands, each twice as deep as the one before it.
+    let mut depth = near;
+    while depth < far {
+        let [low, high] = [spread * depth, spread * 2.0 * depth];
+        let (z, next) = (depth, 2.0 * depth);
+        parts.push(Part::of(quad([[-low, 0.0, z], [-high, 0.0, next], [high, 0.0, next], [low, 0.0, z]])));
+        depth = next;
+    }
+    let mut materials = [None, None];
+    for triangle in 0..mesh.len() {
+        let corners = mesh.positions[triangle].map(Vec3::as_dvec3);
+        let part = parts.iter().position(|part| corners.iter().all(|corner| part.corners.contains(corner)))?;
+        parts[part].take(corners);
+        let is_plane = part > 0;
+        let material = mesh.material_of[triangle];
+        let is_right = *materials[usize::from(is_plane)].get_or_insert(material) == material
+            && (!is_plane
+                || std::iter::zip(corners, mesh.uvs[triangle]).all(|(corner, uv)| has_its_tiles(&exact, corner, uv)));
+        if !is_right {
+            return None;
+        }
+    }
+    if !parts.iter().all(|part| part.is_complete(area(&part.corners))) {
+        return None;
+    }
+    let [sky, plane] = materials.map(|m| m.map(|m| &mesh.materials[m as usize]));
+    let (sky, plane) = (sky?, plane?);
+    let [pale, dark] = checker(&mesh.textures[plane.texture? as usize], exact.plane().ramp)?;
+    sky.texture.is_none().then_some((exact, [plane.albedo * pale, plane.albedo * dark, sky.albedo]))
+}
+
+/// The texture holds two tiles a side.
+fn has_its_tiles(exact: &Horizon, corner: DVec3, uv: Vec2) -> bool {
+    let tiles = exact.plane().tiles(corner.x, corner.z);
+    [f64::from(uv.x), f64::from(uv.y)] == tiles.map(|tile| tile / 2.0)
+}
+
+/// Colours of the pale and the dark tile of a texture that holds 2 × 2 of them, the lower left one pale, each of 1/`ramp`
+/// texels a side.
+fn checker(texture: &Texture, ramp: f64) -> Option<[Vec3; 2]> {
+    let (width, height) = (texture.width, texture.height);
+    if [width, height].map(f64::from) != [2.0 / ramp; 2] {
+        return None;
+    }
+    let is_pale = |column: u32, row: u32| (column < width / 2) == (row >= height / 2);
+    let [pale, dark] = [texture.texel(0, height - 1), texture.texel(0, 0)];
+    let is_checker = (0..height).all(|row| {
+        (0..width).all(|column| texture.texel(column, row) == if is_pale(column, row) { pale } else { dark })
+    });
+    is_checker.then_some([pale, dark].map(Vec3::from_array))
 }
 
 /// Every triangle belongs to the plane, the light or the blocker, each with its own numbers, and the plane fills the

@@ -28,7 +28,7 @@ const DARK: [u8; 3] = [38, 46, 56];
 
 /// Depth of the nearest edge of the plane and of the horizon, both powers of two.
 const NEAR: f64 = 4.0;
-const FAR: f64 = 1024.0;
+const FAR: f64 = 512.0;
 
 /// Half the plane's width at a depth of 1; the picture sees less.
 const SPREAD: f64 = 1.5;
@@ -72,7 +72,8 @@ fn texture_at(x: f64, z: f64) -> [f64; 2] {
 fn write_checker(path: &Path) -> Result<()> {
     let side = 2 * TEXELS;
     let texels = (0..side * side).flat_map(|i| {
-        let is_pale = (i % side < TEXELS) == (i / side < TEXELS);
+        // The tile at the origin of the texture, its lower left one, is pale.
+        let is_pale = (i % side < TEXELS) == (i / side >= TEXELS);
         if is_pale { PALE } else { DARK }
     });
     write_png_rgb8(path, side, side, &texels.collect::<Vec<u8>>())

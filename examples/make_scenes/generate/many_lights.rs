@@ -52,15 +52,16 @@ fn add_hall(obj: &mut Obj) {
     obj.flat_quad([at(HALF, 0.0, -4.0), at(HALF, 0.0, DEPTH), at(HALF, HEIGHT, DEPTH), at(HALF, HEIGHT, -4.0)]);
 }
 
-/// Pillars in rows, some broken off.
+/// Where pillars stand, (x, z): 5 rows of 5.
+fn pillars() -> impl Iterator<Item = [f64; 2]> {
+    (0..25).map(|i| [f64::from(i % 5) * 3.0 - 6.0, 1.6 + 3.0 * f64::from(i / 5)])
+}
+
+/// Pillars of four heights, most of them broken off.
 fn add_pillars(obj: &mut Obj) {
     obj.object("pillars", "pillar");
-    for row in 0..5 {
-        for column in 0..5 {
-            let (x, z) = (f64::from(column) * 3.0 - 6.0, 1.6 + 3.0 * f64::from(row));
-            let height = [4.0, 1.0, 3.0, 2.0][mix(16 + 5 * row + column) as usize % 4];
-            add_box(obj, DVec3::new(x, 0.0, z), 0.4, height);
-        }
+    for (i, [x, z]) in (16..).zip(pillars()) {
+        add_box(obj, DVec3::new(x, 0.0, z), 0.4, [4.0, 1.0, 3.0, 2.0][mix(i) as usize % 4]);
     }
 }
 
@@ -68,7 +69,7 @@ fn add_pillars(obj: &mut Obj) {
 fn add_box(obj: &mut Obj, foot: DVec3, half: f64, height: f64) {
     let at = |x: f64, y: f64, z: f64| foot + DVec3::new(x * half, y * height, z * half);
     let ring = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-    for i in 0..4 {
+    for i in 0..4_usize {
         let ((ax, az), (bx, bz)) = (ring[i], ring[(i + 1) % 4]);
         obj.flat_quad([at(ax, 0.0, az), at(ax, 1.0, az), at(bx, 1.0, bz), at(bx, 0.0, bz)]);
     }
@@ -87,6 +88,8 @@ fn add_lamp(obj: &mut Obj, i: u32) -> (String, String) {
     // Points of a rank-1 lattice: near each other in number, far from each other on the floor.
     let unit = |step: f64, shift: f64| (f64::from(i) * step + shift).fract();
     let (x, z) = ((2.0 * unit(0.754_877_666, 0.5) - 1.0) * 7.0, unit(0.569_840_291, 0.3) * 18.0 - 3.0);
+    // A lamp does not hang in a pillar.
+    let x = if pillars().any(|[px, pz]| (x - px).abs().max((z - pz).abs()) < 0.4 + side) { x + 1.5 } else { x };
     let name = format!("lamp_{i:02}");
     obj.object(&name, &name);
     let half = side / 2.0;
