@@ -82,6 +82,7 @@ impl Backend for Toy {
             exact_reference: name == "exact",
             lens: name == "ramp",
             exposure: 3.0,
+            lights: None,
             memory_bytes: 1000,
         })
     }

@@ -132,6 +132,9 @@ pub struct SceneFacts {
     /// Exposure that the scene file asks for, in pictures to look at alone.
     #[serde(default = "default_exposure")]
     pub exposure: f32,
+    /// Lights of positive power, where lights are asked at all; `None` also in records from before they were counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lights: Option<u32>,
     /// Bytes held while the scene is open.
     pub memory_bytes: u64,
 }

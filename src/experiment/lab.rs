@@ -151,6 +151,7 @@ impl Lab {
             layout: full.layout.to_string(),
             exact_reference: exact::closed_form(&loaded, size).is_some(),
             lens: full.focal_depth().is_some(),
+            lights: full.lights.as_ref().map(|lights| lights.lights().len() as u32),
             exposure: framebuffer.exposure,
             memory_bytes: SCENE_COPIES * full.bytes() as u64,
         };

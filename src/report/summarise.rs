@@ -66,6 +66,8 @@ pub struct SceneSummary {
     pub decisions: Vec<Decision>,
     /// Whether there is a lens to sample.
     pub lens: bool,
+    /// Number of its lights, where it was recorded.
+    pub lights: Option<u32>,
     /// Whether its reference is a closed form.
     pub has_closed_form: bool,
     /// Size of the compared images, `WxH`.
@@ -495,6 +497,7 @@ impl<'a> Index<'a> {
             layout: facts.layout.clone(),
             decisions: facts.decisions(),
             lens: facts.lens,
+            lights: facts.lights,
             has_closed_form: facts.exact_reference,
             size: size.to_string(),
             pixels: size.pixels(),

@@ -99,6 +99,9 @@ impl Scene {
         if matches!(lights, Some(LightSet::Dark)) {
             warnings.push("the scene has no light of positive power: all but emitters is black".to_owned());
         }
+        if stage == Stage::Dof && !has_lens {
+            warnings.push("the camera is a pinhole: stage dof adds nothing to stage aa".to_owned());
+        }
         let camera = Camera::new(&config.camera, size, pixel, aperture);
         let focus = Focus { auto: config.auto_focus, configured: config.camera.focal_depth };
         let faces = geometry::faces(&mesh);
