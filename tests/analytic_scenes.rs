@@ -14,7 +14,7 @@ use common::{
 use glam::{DVec3, Vec2, Vec3};
 use sampler_lab::analytic::quadrature::{Tolerance, integrate};
 use sampler_lab::analytic::{
-    Penumbra, PolygonLight, Receiver, ThinLens, disc_share, pixel_coverage, variance_of_one_area_sample,
+    Horizon, Penumbra, PolygonLight, Receiver, ThinLens, disc_share, pixel_coverage, variance_of_one_area_sample,
 };
 use sampler_lab::render::{light_contribution, render_sample};
 use sampler_lab::sampling::{PointSource, Sampler, point_set};
@@ -324,6 +324,34 @@ fn the_penumbra_scene_is_its_closed_form() {
         assert!(verdict.holds(), "tiles {region:?}: {verdict}");
         // A bias of 1.5 % of full light in any tile is caught.
         assert!(verdict.detects.unwrap() < 0.015 * brightest, "tiles {region:?}: {verdict}");
+    }
+}
+
+/// The scene's files against its closed form: 36 tiles of 4 × 4 pixels, R = 24 replicates of 256 spp, Student's t on the tiles'
+/// means. False-alarm rate 1e-7 for the family.
+///
+/// Rays are in single precision: a direction is off by up to some 2⁻²³, which is 1e-5 of these pixels; a border between
+/// tiles that moves by that changes a tile's mean by less than 1e-5 of the contrast times the borders in it.
+#[test]
+fn the_horizon_scene_is_its_closed_form() {
+    const ALLOWANCE: f64 = 1e-5;
+    let path = format!("{}/configs/horizon.json", env!("CARGO_MANIFEST_DIR"));
+    let loaded = open(path.as_ref(), &OpenOptions::default()).unwrap();
+    let red = |material: &str| loaded.mesh.materials.iter().find(|m| m.name == material).unwrap().albedo.x;
+    let (sky, checker) = (f64::from(red("sky")), &loaded.mesh.textures[0]);
+    let [pale, dark] = [checker.height - 1, 0].map(|row| f64::from(checker.texel(0, row)[0]));
+    let seen = Horizon::standard(24, 24).unwrap().image().unwrap();
+    let exact = tiles(&seen.iter().map(|seen| seen.colour(pale, dark, sky)).collect::<Vec<_>>());
+    let scene = Scene::new(&loaded.config, loaded.mesh, (24, 24), Stage::Final).unwrap();
+    assert_eq!(scene.layout.to_string(), "pixel 0–1, 2 dimensions in all");
+    let images: Vec<Vec<f64>> = replicates(&scene, spec("sobol"), 256, 0..24).iter().map(|i| tiles(i)).collect();
+    let family = Family { tests: 36, false_alarm: 1e-7 };
+    for (tile, &value) in exact.iter().enumerate() {
+        let means: Vec<f64> = images.iter().map(|image| image[tile]).collect();
+        let verdict = Exact { value, allowance: ALLOWANCE }.test(&means, family);
+        assert!(verdict.holds(), "tile {tile}: {verdict}");
+        // A bias of 2 % of the contrast in any tile is caught; the sky's tiles are exactly its colour.
+        assert!(verdict.detects.is_none_or(|detects| detects < 0.02 * (pale - dark)), "tile {tile}: {verdict}");
     }
 }
 

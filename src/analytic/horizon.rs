@@ -20,6 +20,10 @@ use crate::error::{Error, Result};
 /// Error of a pixel's [`Seen::checker`], which is within ±1: far below the rounding of the `f32` in which pictures are stored.
 pub const PIXEL_TOLERANCE: f64 = 1e-9;
 
+/// √(1/3) and √(3/5): the outer nodes of the Gauss rules of two and three points on [−1, 1].
+const GAUSS_2: f64 = 0.577_350_269_189_625_8;
+const GAUSS_3: f64 = 0.774_596_669_241_483_4;
+
 /// The plane's pattern and extent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CheckeredPlane {
@@ -52,14 +56,55 @@ impl CheckeredPlane {
         // Borders are far below 2⁵³, so the remainder is exact.
         if border % 2.0 == 0.0 { height } else { -height }
     }
+}
 
-    /// The first v beyond `from`, in the direction of `step`, at which a ramp starts or ends.
-    fn next_break(&self, from: f64, step: f64) -> f64 {
-        let (v, half) = (from * step.signum(), self.ramp / 2.0);
-        // In the direction of travel ramps start at n − half and end at n + half, on both sides of 0 alike.
-        let border = (v - half).floor() + 1.0;
-        let next = if v < border - half { border - half } else { border + half };
-        next * step.signum()
+/// One wave along a row of the image: linear pieces in the order in which the row runs through them.
+///
+/// s is odd, so a row that runs backward is one that runs forward with the other sign; u is the tile coordinate in the
+/// direction of the row.
+#[derive(Debug, Clone, Copy)]
+struct Walk {
+    /// u where the row starts, and u per pixel, 0 or above.
+    start: f64,
+    step: f64,
+    ramp: f64,
+    /// The border whose ramp is next, or under way.
+    border: f64,
+    on_ramp: bool,
+    /// −s before that border: 1 before an even one, where the row runs forward.
+    sign: f64,
+}
+
+impl Walk {
+    fn new(start: f64, step: f64, ramp: f64) -> Self {
+        let direction = step.signum();
+        let start = start * direction;
+        let border = (start - ramp / 2.0).floor() + 1.0;
+        // Borders are far below 2⁵³, so the remainder is exact.
+        let sign = if border % 2.0 == 0.0 { direction } else { -direction };
+        Self { start, step: step.abs(), ramp, border, on_ramp: start >= border - ramp / 2.0, sign }
+    }
+
+    /// Where this piece ends, in pixels from the start; ∞ where the row runs along a border.
+    fn end(&self) -> f64 {
+        let half = if self.on_ramp { self.ramp / 2.0 } else { -self.ramp / 2.0 };
+        (self.border + half - self.start) / self.step
+    }
+
+    fn advance(&mut self) {
+        if self.on_ramp {
+            (self.border, self.sign) = (self.border + 1.0, -self.sign);
+        }
+        self.on_ramp = !self.on_ramp;
+    }
+
+    /// s at `x` pixels from the start, which is on this piece.
+    fn at(&self, x: f64) -> f64 {
+        if self.on_ramp {
+            self.sign * (self.start + self.step * x - self.border) * (2.0 / self.ramp)
+        } else {
+            -self.sign
+        }
     }
 }
 
@@ -186,33 +231,24 @@ impl Horizon {
         let per_pixel = self.view.right.x * -self.camera.position.y / self.view.ray(from, y).y;
         let start = plane.tiles(x, z);
         let step = [plane.across[0] * per_pixel, plane.along[0] * per_pixel];
-        // Image positions, from `from`, at which either wave next has a kink.
-        let reach =
-            |axis: usize, v: f64| if step[axis] == 0.0 { f64::INFINITY } else { (v - start[axis]) / step[axis] };
-        let mut breaks = [0, 1].map(|axis| plane.next_break(start[axis], step[axis]));
-        let (mut at, mut sum) = (0.0, 0.0);
-        loop {
-            let ends = [reach(0, breaks[0]), reach(1, breaks[1])];
-            let end = ends[0].min(ends[1]).min(to - from).max(at);
-            sum += self.smooth_part(start, step, [at, end]);
-            if end >= to - from {
-                return sum;
-            }
+        let mut walks = [0, 1].map(|axis| Walk::new(start[axis], step[axis], plane.ramp));
+        let (length, mut at, mut sum) = (to - from, 0.0, 0.0);
+        while at < length {
+            let ends = walks.map(|walk| walk.end());
+            let end = ends[0].min(ends[1]).min(length).max(at);
+            let (centre, half) = (0.5 * (at + end), 0.5 * (end - at));
+            // The product is quadratic: two Gauss points are exact to degree three.
+            let node = half * GAUSS_2;
+            let product = |x: f64| walks[0].at(x) * walks[1].at(x);
+            sum += half * (product(centre - node) + product(centre + node));
             at = end;
-            for axis in [0, 1] {
-                if ends[axis] <= end {
-                    breaks[axis] = plane.next_break(breaks[axis], step[axis]);
+            for (walk, reached) in std::iter::zip(&mut walks, ends) {
+                if reached <= end {
+                    walk.advance();
                 }
             }
         }
-    }
-
-    /// The integral over a part in which both waves are linear: two Gauss points are exact to degree three.
-    fn smooth_part(&self, start: [f64; 2], step: [f64; 2], [from, to]: [f64; 2]) -> f64 {
-        let (centre, half) = (0.5 * (from + to), 0.5 * (to - from));
-        let at = |x: f64| self.plane.wave(start[0] + step[0] * x) * self.plane.wave(start[1] + step[1] * x);
-        let node = half * 0.577_350_269_189_625_7;
-        half * (at(centre - node) + at(centre + node))
+        sum
     }
 
     /// The row in which the line `axis` · (x, z) = v of the plane crosses a side x of a pixel: the rays d through the line
@@ -303,8 +339,8 @@ impl Horizon {
         for end in rows {
             let (centre, half) = (0.5 * (y + end), 0.5 * (end - y));
             let pair = |node: f64| along(centre - node * half) + along(centre + node * half);
-            let two = half * pair(0.577_350_269_189_625_7);
-            let three = half * (5.0 / 9.0 * pair(0.774_596_669_241_483_4) + 8.0 / 9.0 * along(centre));
+            let two = half * pair(GAUSS_2);
+            let three = half * (5.0 / 9.0 * pair(GAUSS_3) + 8.0 / 9.0 * along(centre));
             // No tolerance below what rounding allows.
             let tolerance = PIXEL_TOLERANCE * (end - y).max(1e-6);
             let part = if (three - two).abs() <= tolerance {
@@ -361,17 +397,27 @@ mod tests {
     }
 
     #[test]
-    fn breaks_are_where_ramps_start_and_end_in_both_directions() {
+    fn a_walk_meets_the_wave_s_pieces_in_order_in_both_directions() {
         let plane = CheckeredPlane { ramp: 0.25, ..*standard().plane() };
-        let walk = |mut v: f64, step: f64| -> [f64; 4] {
-            std::array::from_fn(|_| {
-                v = plane.next_break(v, step);
-                v
-            })
-        };
-        assert_eq!(walk(0.5, 0.1), [0.875, 1.125, 1.875, 2.125]);
-        assert_eq!(walk(0.5, -0.1), [0.125, -0.125, -0.875, -1.125]);
-        assert_eq!(walk(-0.875, 3.0), [-0.125, 0.125, 0.875, 1.125]);
+        for (start, step) in
+            [(0.5, 0.1), (0.5, -0.1), (-0.875, 3.0), (-1.05, -0.7), (7.125, 2.0), (6.875, -2.0), (0.3, 0.0)]
+        {
+            let (mut walk, mut from) = (Walk::new(start, step, plane.ramp), 0.0);
+            for piece in 0..9 {
+                let end = walk.end().min(99.0);
+                assert!(end >= from, "{start} {step}, piece {piece}");
+                for share in [0.0, 0.3, 1.0] {
+                    let x = from + share * (end - from);
+                    let difference = walk.at(x) - plane.wave(start + step * x);
+                    assert!(difference.abs() < 1e-12, "{start} {step}, piece {piece} at {x}: {difference}");
+                }
+                from = end;
+                walk.advance();
+                if step == 0.0 {
+                    break;
+                }
+            }
+        }
     }
 
     #[test]

@@ -34,7 +34,7 @@ const HEIGHT: f64 = 7.0;
 /// # Errors
 /// Kind `Write` where a file cannot be written.
 pub fn write(folder: &Path) -> Result<()> {
-    let mut obj = Obj::new(4);
+    let mut obj = Obj::new(6);
     add_hall(&mut obj);
     add_pillars(&mut obj);
     let lamps: Vec<(String, String)> = (0..LAMPS).map(|i| add_lamp(&mut obj, i)).collect();
@@ -82,28 +82,30 @@ fn add_box(obj: &mut Obj, foot: DVec3, half: f64, height: f64) {
 /// its pool of light is small and faint, but brighter than what the others leave there in a pillar's shadow.
 fn add_lamp(obj: &mut Obj, i: u32) -> (String, String) {
     let power = libm::pow(10.0, -DECADES * f64::from(i) / f64::from(LAMPS - 1));
-    let root = power.sqrt();
-    let size = root.sqrt();
-    let (side, height) = (0.6 * size, 5.6 * size);
+    let size = power.sqrt().sqrt();
+    // To whole 64ths, which are exact in f32: so its two triangles are one square to the last bit.
+    let snapped = |x: f64| (x * 64.0).round() / 64.0;
+    let (side, height) = (snapped(0.6 * size), 5.6 * size);
     // Points of a rank-1 lattice: near each other in number, far from each other on the floor.
     let unit = |step: f64, shift: f64| (f64::from(i) * step + shift).fract();
     let (x, z) = ((2.0 * unit(0.754_877_666, 0.5) - 1.0) * 7.0, unit(0.569_840_291, 0.3) * 18.0 - 3.0);
     // A lamp does not hang in a pillar.
     let x = if pillars().any(|[px, pz]| (x - px).abs().max((z - pz).abs()) < 0.4 + side) { x + 1.5 } else { x };
+    let (left, back) = (snapped(x - side / 2.0), snapped(z - side / 2.0));
     let name = format!("lamp_{i:02}");
     obj.object(&name, &name);
-    let half = side / 2.0;
-    let corner = |dx: f64, dz: f64| DVec3::new(x + dx * half, height, z + dz * half);
-    obj.flat_quad([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]);
-    let [r, g, b] = hue(f64::from(i) * 0.618_034, 0.25 + 0.6 * (1.0 - size));
-    let strength = 40.0 * root;
+    let corner = |dx: f64, dz: f64| DVec3::new(left + dx * side, height, back + dz * side);
+    obj.flat_quad([corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)]);
+    let [r, g, b] = colour(f64::from(i) * 0.618_034, 0.25 + 0.6 * (1.0 - size));
+    // Power is area × luma of what is emitted, and that is colour × strength.
+    let strength = 7.2 * power / (side * side * (0.2126 * r + 0.7152 * g + 0.0722 * b));
     (name, format!("Kd {r:.3} {g:.3} {b:.3}\nKe {strength:.5} {strength:.5} {strength:.5}"))
 }
 
-/// A colour of luma near 1/2 on the wheel, `turn` in turns, between grey (0) and pure (1).
-fn hue(turn: f64, saturation: f64) -> [f64; 3] {
+/// A colour on the wheel, `turn` in turns, between grey (saturation 0) and pure (1).
+fn colour(turn: f64, saturation: f64) -> [f64; 3] {
     std::array::from_fn(|channel| {
         let angle = std::f64::consts::TAU * (turn - channel as f64 / 3.0);
-        0.6 * (1.0 - saturation) + 0.6 * saturation * (0.5 + 0.5 * libm::cos(angle)) / 0.6
+        0.6 * (1.0 - saturation) + saturation * (0.5 + 0.5 * libm::cos(angle))
     })
 }

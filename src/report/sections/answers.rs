@@ -222,6 +222,7 @@ fn helps(summary: &Summary, scene: usize) -> Option<String> {
 /// Correlation between decisions and between pixels hurts.
 fn hurts(summary: &Summary) -> Option<String> {
     let worst = (0..summary.scenes.len())
+        .filter(|&scene| summary.scenes[scene].decisions.len() > 1)
         .flat_map(|scene| summary.literal_pairs().into_iter().map(move |pair| (scene, pair)))
         .filter_map(|(scene, (sheet, best))| {
             let most = summary.most_spp()?;

@@ -31,14 +31,21 @@ pub fn between_decisions(summary: &Summary, page: &mut Page) {
     );
     pairing_table(summary, page);
     let (with, without) = scenes_by_lens(summary);
-    let scenes: Vec<usize> = with.iter().chain(&without).copied().collect();
-    literal_table(summary, &scenes, &pairs, page);
+    let (scenes, single): (Vec<usize>, Vec<usize>) =
+        with.iter().chain(&without).copied().partition(|&scene| summary.scenes[scene].decisions.len() > 1);
+    if !scenes.is_empty() {
+        literal_table(summary, &scenes, &pairs, page);
+    }
     let found: Vec<String> = scenes.iter().flat_map(|&scene| scene_sentences(summary, scene, &pairs)).collect();
-    if found.is_empty() && summary.course_counts().is_some() {
+    if found.is_empty() && !scenes.is_empty() && summary.course_counts().is_some() {
         page.paragraph("In no scene is a wrong limit or a stall of the literal reading seen.");
     }
     page.bullets(&found);
     page.sentences(&[control_sentence(summary, &scenes).unwrap_or_default()]);
+    if !single.is_empty() {
+        let names: Vec<String> = single.iter().map(|&scene| scene_name(summary, scene)).collect();
+        page.paragraph(&format!("No two decisions meet in {}, so there is nothing to be in step.", listed(&names)));
+    }
     if with.is_empty() {
         page.paragraph("No scene of this experiment has a lens, so what decisions in step do to one was not measured.");
     }

@@ -24,6 +24,7 @@ mod identical;
 mod opening;
 mod pictures;
 mod points;
+mod scenes;
 mod shortcut;
 mod speed;
 mod stability;

@@ -8,7 +8,7 @@ use super::super::numbers::{counted, listed, short};
 use super::super::provenance;
 use super::super::summarise::{SLOPE_COUNTS, Summary};
 use super::words::name;
-use super::{tabulate, tabulate_folded, titles};
+use super::{scenes, tabulate, tabulate_folded, titles};
 
 /// Title, provenance, and what is missing.
 pub fn title(summary: &Summary, page: &mut Page) {
@@ -125,6 +125,7 @@ pub fn how_to_read(summary: &Summary, page: &mut Page) {
 /// The tables of scenes and samplers.
 pub fn scenes_and_samplers(summary: &Summary, page: &mut Page) {
     page.heading(3, "Scenes and samplers");
+    scenes::matrix(summary, page);
     let rows: Vec<Vec<String>> = summary
         .scenes
         .iter()
@@ -132,8 +133,6 @@ pub fn scenes_and_samplers(summary: &Summary, page: &mut Page) {
             let reference = scene.reference.as_ref();
             vec![
                 format!("`{}`", scene.name),
-                scene.layout.clone(),
-                if scene.lens { "yes" } else { "no" }.to_owned(),
                 scene.size.to_string(),
                 reference.map_or("missing".to_owned(), |r| short(r.mean)),
                 match reference {
@@ -144,9 +143,8 @@ pub fn scenes_and_samplers(summary: &Summary, page: &mut Page) {
             ]
         })
         .collect();
-    let head =
-        ["scene", "decisions and the dimensions they read", "lens", "pixels", "mean radiance", "reference's RMSE"];
-    let caption = "Scenes: what each decides at random, size of the compared images in pixels, mean radiance and the reference's own error (root mean \
+    let head = ["scene", "pixels", "mean radiance", "reference's RMSE"];
+    let caption = "Scenes: size of the compared images in pixels, mean radiance and the reference's own error (root mean \
                    square, RMSE) in W/(m² sr).";
     tabulate(page, "scenes", caption, &head, &rows);
     let rows: Vec<Vec<String>> = (0..summary.samplers.len()).map(|i| sampler_row(summary, i)).collect();
