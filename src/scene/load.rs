@@ -11,6 +11,7 @@ use sha2::{Digest, Sha256};
 
 use super::config::{Estimator, FramebufferConfig, MaterialPatch, SceneConfig};
 use super::json::suggestion;
+use super::light::luma;
 use super::mesh::{Material, Mesh, Texture};
 use super::obj::{self, CheckedObj, MtlMaterial};
 use crate::error::{Error, Result};
@@ -495,20 +496,30 @@ fn is_diffuse(kind: &str) -> bool {
     kind.contains("diffuse") || kind.contains("lambert")
 }
 
-/// One line for each emitter: file, name, radiance, number of triangles.
+/// More emitters than this are listed in one line.
+const MOST_EMITTER_LINES: usize = 8;
+
+/// One line for each emitter: file, name, radiance, number of triangles; one for all where they are many.
 fn emitter_list(mesh: &Mesh, config: &SceneConfig) -> Vec<String> {
     let mut triangles = vec![0usize; mesh.materials.len()];
     for &material in &mesh.material_of {
         triangles[material as usize] += 1;
     }
-    let emitters = mesh.materials.iter().zip(triangles).filter(|(material, _)| material.is_emitter);
-    emitters
-        .map(|(material, n)| {
-            let file = &config.mesh_files[material.file as usize];
-            let [r, g, b] = material.emission.to_array();
-            format!("{file}: {:?} emits radiance [{r}, {g}, {b}] from {n} triangles", material.name)
-        })
-        .collect()
+    let emitters: Vec<(&Material, usize)> =
+        mesh.materials.iter().zip(triangles).filter(|(material, _)| material.is_emitter).collect();
+    let place = |material: &Material| format!("{}: {:?}", config.mesh_files[material.file as usize], material.name);
+    if emitters.len() > MOST_EMITTER_LINES {
+        let lumas = emitters.iter().map(|(material, _)| luma(material.emission));
+        let (low, high) = lumas.fold((f32::MAX, 0.0f32), |(low, high), luma| (low.min(luma), high.max(luma)));
+        let names: Vec<String> = emitters.iter().map(|(material, _)| place(material)).collect();
+        let count = emitters.len();
+        return vec![format!("{count} materials emit radiance of luma {low:.3e} to {high:.3e}: {}", names.join(", "))];
+    }
+    let line = |&(material, n): &(&Material, usize)| {
+        let [r, g, b] = material.emission.to_array();
+        format!("{} emits radiance [{r}, {g}, {b}] from {n} triangles", place(material))
+    };
+    emitters.iter().map(line).collect()
 }
 
 /// PNG or JPEG bytes → linear texels; an alpha channel is not used.
