@@ -11,7 +11,7 @@ use crate::sampling::{Decision, Order, Points, SamplerSet, SamplerSpec};
 use crate::stats::Estimate;
 use crate::stats::moments::student_t_quantile;
 
-use super::evidence::{Answer, below, ratio};
+use super::evidence::{Answer, above, below, ratio};
 use super::summarise::{Cell, Summary};
 
 /// What an exchange asks.
@@ -162,9 +162,55 @@ impl Ablation<'_> {
         source(&errors, (self.base_cell.mse, freedom(self.base_cell)))
     }
 
-    /// 1 − Σ gone: in a [`Question::Share`] what is left to interactions of decisions, and to what a decision's own points
-    /// leave of its main effect. `None` where a decision has no exchange.
-    pub fn left(&self) -> Option<Estimate> {
+    /// Whether the exchange of part `i` alone takes more than half of the error away, at a joint level of 95 % over the
+    /// decisions.
+    pub fn is_over_half(&self, i: usize) -> Answer {
+        let tests = self.parts.len();
+        let cell = |cell: &Cell| widened((cell.mse, freedom(cell)), tests);
+        ratio(&cell(self.parts[i].cell), &cell(self.base_cell)).map_or(Answer::CannotTell, |ratio| below(&ratio, 0.5))
+    }
+
+    /// Whether the error grows by each exchange alone, at a joint level of 95 % over the decisions.
+    pub fn grows_by_each(&self) -> bool {
+        let tests = self.parts.len();
+        let cell = |cell: &Cell| widened((cell.mse, freedom(cell)), tests);
+        let grows = |part: &Part| {
+            let ratio = ratio(&cell(part.cell), &cell(self.base_cell));
+            ratio.is_some_and(|ratio| above(&ratio, 1.0) == Answer::Yes)
+        };
+        !self.parts.is_empty() && self.parts.iter().all(grows)
+    }
+
+    /// In a [`Question::Coupling`] the decisions whose exchange alone takes more than half of the error away, largest
+    /// share first, where they are several. Shares of more than half overlap: parting either decision cures the same
+    /// coupling, which is theirs together and no single one's.
+    pub fn coupled(&self) -> Vec<usize> {
+        let is_large = |i: &usize| self.is_over_half(*i) == Answer::Yes;
+        let mut large: Vec<usize> = match self.question {
+            Question::Coupling => (0..self.parts.len()).filter(is_large).collect(),
+            _ => Vec::new(),
+        };
+        large.sort_by(|&a, &b| self.parts[b].gone.value.total_cmp(&self.parts[a].gone.value));
+        if large.len() > 1 { large } else { Vec::new() }
+    }
+
+    /// In a [`Question::Share`] the most that interactions of decisions can carry: what all well-spread points at once leave,
+    /// 1 − all, or what is left when the single shares are taken off, 1 − Σ gone, where that is clearly less.
+    ///
+    /// Both are upper bounds: points in orders of their own leave interactions as they were, and of main effects what so
+    /// many points miss. Points joint over the decisions (the other sampler in step) can take interactions away, so then
+    /// the first says nothing. `None` where neither can be had.
+    pub fn interactions(&self) -> Option<Estimate> {
+        if self.question != Question::Share {
+            return None;
+        }
+        let is_apart = self.other.order != Order::Step;
+        let all = self.all.as_ref().filter(|_| is_apart).map(|(_, share)| gone(share));
+        tighter(all, self.left())
+    }
+
+    /// 1 − Σ gone; `None` where a decision has no exchange.
+    fn left(&self) -> Option<Estimate> {
         if !self.absent.is_empty() {
             return None;
         }
@@ -174,6 +220,17 @@ impl Ablation<'_> {
         let left =
             Estimate { value: over_base.value + shift, ci95: over_base.ci95.map(|ends| ends.map(|end| end + shift)) };
         Some(left)
+    }
+}
+
+/// Of two upper bounds the first, unless the second's interval lies below it.
+fn tighter(first: Option<Estimate>, second: Option<Estimate>) -> Option<Estimate> {
+    match (first, second) {
+        (Some(first), Some(second)) => {
+            let low = first.ci95.map_or(first.value, |[low, _]| low);
+            Some(if below(&second, low) == Answer::Yes { second } else { first })
+        }
+        (first, second) => first.or(second),
     }
 }
 
@@ -274,6 +331,18 @@ mod tests {
             assert_eq!(source(&far, measured(3.0, key(7))), Source::One(1));
         }
         assert!(missed <= 28, "{missed} of 300");
+    }
+
+    /// A bound that is not clearly the lower of two is not taken, or the one with more noise would win by it.
+    #[test]
+    fn of_two_bounds_the_second_is_taken_only_where_it_is_clearly_lower() {
+        let e = |value: f64, half: f64| Estimate { value, ci95: Some([value - half, value + half]) };
+        let value = |a, b| tighter(a, b).map(|bound: Estimate| bound.value);
+        assert_eq!(value(Some(e(0.3, 0.02)), Some(e(0.4, 0.2))), Some(0.3));
+        assert_eq!(value(Some(e(0.3, 0.02)), Some(e(0.2, 0.1))), Some(0.3), "perhaps lower");
+        assert_eq!(value(Some(e(0.3, 0.02)), Some(e(0.2, 0.05))), Some(0.2));
+        assert_eq!(value(None, Some(e(0.2, 0.1))), Some(0.2));
+        assert_eq!(value(None, None), None);
     }
 
     #[test]
