@@ -345,6 +345,83 @@ mod tests {
         assert_eq!(value(None, None), None);
     }
 
+    fn cell(mse: f64) -> Cell {
+        let e = Estimate { value: mse, ci95: Some([0.98 * mse, 1.02 * mse]) };
+        Cell {
+            scene: 0,
+            sampler: 0,
+            id: String::new(),
+            spp: crate::experiment::results::Count { asked: 16, taken: 16 },
+            replicates: 8,
+            is_fixed: false,
+            mse: e,
+            rmse: None,
+            rel_mse: e,
+            bias2: e,
+            variance: None,
+            bias: e,
+            error_autocorrelation: None,
+            replicate_mse: Vec::new(),
+            replicate_mean: Vec::new(),
+            pixels: Vec::new(),
+            twins: Vec::new(),
+        }
+    }
+
+    /// From an error of 1, within 2 percent, to `errors` of the parts and of all at once.
+    fn with_group<T>(question: Question, errors: &[f64], all: f64, see: impl Fn(&Ablation) -> T) -> T {
+        let (base, cells, end) = (cell(1.0), errors.iter().map(|&e| cell(e)).collect::<Vec<_>>(), cell(all));
+        let gone = |cell: &Cell| gone(&ratio(&cell.mse, &base.mse).unwrap());
+        let part = |(cell, decision): (_, &Decision)| Part { decision: *decision, cell, gone: gone(cell) };
+        let other = SamplerSpec::parse("ld:shuffle:xor@each", crate::sampling::Preset::Best).unwrap();
+        see(&Ablation {
+            scene: 0,
+            base: 0,
+            other,
+            question,
+            spp: 16,
+            base_cell: &base,
+            parts: cells.iter().zip(&Decision::ALL).map(part).collect(),
+            absent: Vec::new(),
+            all: Some((&end, gone(&end))),
+        })
+    }
+
+    #[test]
+    fn an_error_comes_from_a_decision_that_takes_more_than_half_away() {
+        let answers = |group: &Ablation| (0..3).map(|i| group.is_over_half(i)).collect::<Vec<_>>();
+        let found = with_group(Question::Share, &[0.3, 0.5, 0.94], 0.2, answers);
+        assert_eq!(found, [Answer::Yes, Answer::CannotTell, Answer::No]);
+    }
+
+    #[test]
+    fn a_coupling_belongs_to_all_decisions_that_each_cure_more_than_half_of_it() {
+        let coupled = |question, errors: &[f64]| with_group(question, errors, 0.1, |group| group.coupled());
+        assert_eq!(coupled(Question::Coupling, &[0.30, 0.17, 0.86]), [1, 0], "largest first");
+        assert!(coupled(Question::Coupling, &[0.7, 0.17, 0.86]).is_empty(), "one with the others");
+        assert!(coupled(Question::Coupling, &[0.3, 0.5, 0.86]).is_empty(), "perhaps over half is not over half");
+        assert!(coupled(Question::Share, &[0.30, 0.17, 0.86]).is_empty());
+    }
+
+    #[test]
+    fn an_error_grows_by_each_exchange_only_where_the_joint_level_says_so() {
+        let grows = |errors: &[f64]| with_group(Question::Coupling, errors, 1.0, Ablation::grows_by_each);
+        assert!(grows(&[1.3, 1.1]));
+        // Above 1 by a plain interval, which two comparisons at once widen by a fifth.
+        assert!(!grows(&[1.3, 1.03]) && !grows(&[1.3, 0.9]));
+        assert!(grows(&[1.03]), "one comparison widens nothing");
+    }
+
+    #[test]
+    fn interactions_carry_no_more_than_what_all_decisions_at_once_leave() {
+        let most = |errors: &[f64], all| {
+            with_group(Question::Share, errors, all, |group| group.interactions().map(|most| most.value)).unwrap()
+        };
+        assert!((most(&[0.8, 0.7], 0.2) - 0.2).abs() < 1e-12, "the single shares leave 50 %");
+        assert!((most(&[0.6, 0.5], 0.4) - 0.1).abs() < 1e-12, "the single shares leave 10 %");
+        assert_eq!(with_group(Question::Coupling, &[0.6, 0.5], 0.4, Ablation::interactions), None);
+    }
+
     #[test]
     fn an_exchange_that_lowers_nothing_is_no_source() {
         let e = |value: f64, half: f64| (Estimate { value, ci95: Some([value - half, value + half]) }, 7.0);

@@ -308,3 +308,22 @@ pub fn answer(summary: &Summary, link: &str) -> Option<String> {
         format!("**Which decision does the error come from?** By the share of the MSE that one decision alone takes away: {}; see {link}.", told.join("; "))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_grows_is_added_and_what_shrinks_is_taken_away() {
+        let e = |value: f64| Estimate { value, ci95: Some([value - 0.02, value + 0.02]) };
+        assert_eq!(all_at_once(&e(0.4)), "all decisions at once take 40 % [38 %, 42 %] away");
+        assert_eq!(all_at_once(&e(-0.3)), "all decisions at once add 30 % [28 %, 32 %]");
+    }
+
+    #[test]
+    fn a_largest_share_is_called_the_source_only_where_it_is_over_half() {
+        assert_eq!(largest_words(Question::Share, Answer::Yes).0, "the error comes from the");
+        assert_eq!(largest_words(Question::Share, Answer::No).1, ", not over half");
+        assert_eq!(largest_words(Question::Coupling, Answer::CannotTell).1, ", cannot tell whether over half");
+    }
+}
