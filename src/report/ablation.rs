@@ -405,7 +405,7 @@ mod tests {
 
     #[test]
     fn an_error_grows_by_each_exchange_only_where_the_joint_level_says_so() {
-        let grows = |errors: &[f64]| with_group(Question::Coupling, errors, 1.0, Ablation::grows_by_each);
+        let grows = |errors: &[f64]| with_group(Question::Coupling, errors, 1.0, |group| group.grows_by_each());
         assert!(grows(&[1.3, 1.1]));
         // Above 1 by a plain interval, which two comparisons at once widen by a fifth.
         assert!(!grows(&[1.3, 1.03]) && !grows(&[1.3, 0.9]));
@@ -419,7 +419,7 @@ mod tests {
         };
         assert!((most(&[0.8, 0.7], 0.2) - 0.2).abs() < 1e-12, "the single shares leave 50 %");
         assert!((most(&[0.6, 0.5], 0.4) - 0.1).abs() < 1e-12, "the single shares leave 10 %");
-        assert_eq!(with_group(Question::Coupling, &[0.6, 0.5], 0.4, Ablation::interactions), None);
+        assert_eq!(with_group(Question::Coupling, &[0.6, 0.5], 0.4, |group| group.interactions()), None);
     }
 
     #[test]

@@ -543,7 +543,7 @@ mod tests {
         assert!((chi2_quantile(0.025, 7.0) - 16.0128).abs() < 1e-4);
         assert!((chi2_quantile(0.975, 7.0) - 1.68987).abs() < 1e-5);
         let of = |replicates: usize, half: f64| {
-            let rmse = |i: usize| 1.0 + if i % 2 == 0 { half } else { -half };
+            let rmse = |i: usize| 1.0 + if i.is_multiple_of(2) { half } else { -half };
             let replicate_mse = (0..replicates).map(|i| rmse(i) * rmse(i)).collect();
             spread(&Cell { replicate_mse, ..cell("a", 64, e(1.0, 0.9, 1.1)) }).unwrap()
         };
