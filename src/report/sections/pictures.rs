@@ -36,12 +36,13 @@ pub fn stages(summary: &Summary, figures: &Figures, page: &mut Page) {
     show(page, figures, "stages", false, &caption);
 }
 
-/// Who made the stages and with how many samples, where it is the same for all: "`uniform`, 64 spp".
+/// Who made the stages and with how many samples: "by `uniform`, 1 and 26 spp".
 fn made_by(stages: &[&ImageRow]) -> String {
-    let mut makers: Vec<String> =
-        stages.iter().map(|stage| format!("sampler `{}`, {} spp", stage.sampler, stage.spp.taken)).collect();
-    makers.dedup();
-    listed(&makers)
+    let mut samplers: Vec<String> = stages.iter().map(|stage| format!("`{}`", stage.sampler)).collect();
+    let mut counts: Vec<String> = stages.iter().map(|stage| stage.spp.taken.to_string()).collect();
+    samplers.dedup();
+    counts.dedup();
+    format!("By {}, {} spp", listed(&samplers), listed(&counts))
 }
 
 /// Equal samples and equal time side by side, scene by scene.
