@@ -149,6 +149,7 @@ mod tests {
                 names: Vec::new(),
                 spp: Count { asked: spp[i], taken: spp[i] },
                 replicate: 0,
+                batch: 0,
                 seed: 0,
                 estimator: Estimator::Unbiased,
                 stage: Stage::Final,
