@@ -177,6 +177,7 @@ mod tests {
                 names: Vec::new(),
                 spp: Count { asked: spp[i], taken: spp[i] },
                 replicate: 0,
+                batch: 0,
                 seed: 0,
                 estimator: Estimator::Unbiased,
                 stage: Stage::Final,
