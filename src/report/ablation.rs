@@ -354,6 +354,7 @@ mod tests {
             spp: crate::experiment::results::Count { asked: 16, taken: 16 },
             replicates: 8,
             is_fixed: false,
+            is_reference_limited: false,
             mse: e,
             rmse: None,
             rel_mse: e,

@@ -522,6 +522,7 @@ mod tests {
             spp: crate::experiment::results::Count { asked: spp, taken: spp },
             replicates: 8,
             is_fixed: false,
+            is_reference_limited: false,
             mse,
             rmse: None,
             rel_mse: mse,
