@@ -274,8 +274,9 @@ fn shards_merged_in_any_order_are_the_run_that_was_not_cut() {
     desk.lab(&["merge", "1", "2", "--out", "2"]).with(4, &["missing shards: --shard 3/3"]);
     assert!(String::from_utf8(desk.bytes("2/report.md")).unwrap().contains("**Incomplete.**"));
     let status = desk.lab(&["status", "2", "--json"]).json();
+    let next = format!("sampler-lab run small.json --data {} --out 2 --shard 3/3", repository("data").display());
     assert_eq!(status["missing_shards"], serde_json::json!(["3/3"]));
-    assert_eq!(status["next"], serde_json::json!(["sampler-lab run small.json --out 2 --shard 3/3"]));
+    assert_eq!(status["next"], serde_json::json!([next]));
     desk.lab(&["merge", "3", "--out", "2"]).with(0, &[]);
     desk.assert_same("2", &expected);
     // More shards than there are groups, one after the other in one folder: the last one completes it.
@@ -283,6 +284,47 @@ fn shards_merged_in_any_order_are_the_run_that_was_not_cut() {
         desk.run("one-by-one", &["--shard", &format!("{index}/24")]).with(0, &[]);
     }
     desk.assert_same("one-by-one", &expected);
+}
+
+/// The path of the experiment file is no part of the results, however and wherever it is typed.
+#[test]
+fn shards_of_one_experiment_under_several_spellings_merge_to_the_same_bytes_in_any_order() {
+    let desk = Desk::new();
+    desk.run("whole", &[]).with(0, &[]);
+    let elsewhere = desk.path("else where");
+    std::fs::create_dir(&elsewhere).unwrap();
+    for file in ["small.json", "cornell.json"] {
+        std::fs::copy(desk.path(file), elsewhere.join(file)).unwrap();
+    }
+    desk.lab(&["run", "./small.json", "--shard", "1/2", "--out", "1", "--quiet"]).with(0, &[]);
+    desk.lab(&["run", "else where/../else where/small.json", "--shard", "2/2", "--out", "2", "--quiet"]).with(0, &[]);
+    for order in [["1", "2"], ["2", "1"]] {
+        let out = order.concat();
+        desk.lab(&[&["merge"], &order[..], &["--out", &out, "--quiet"]].concat()).with(0, &[]);
+        desk.assert_same(&out, &desk.results("whole"));
+    }
+    // What `status` says to do next is what a shell does.
+    let next = desk.lab(&["status", "2", "--json"]).json()["next"][0].as_str().unwrap().to_owned();
+    assert!(next.contains("run 'else where/small.json' --data ") && next.ends_with(" --shard 1/2"), "{next}");
+    let mut command = Command::new("sh");
+    let script = next.replacen("sampler-lab", env!("CARGO_BIN_EXE_sampler-lab"), 1);
+    command.current_dir(desk.0.path()).args(["-c", &script]).stdin(Stdio::null());
+    ended(command).with(0, &[]);
+    desk.assert_same("2", &desk.results("whole"));
+}
+
+#[test]
+fn status_sees_that_the_experiment_file_was_edited() {
+    let desk = Desk::new();
+    desk.run("a", &[]).with(0, &[]);
+    std::fs::write(desk.path("small.json"), SMALL.replace("[1, 16]", "[1, 4, 16]")).unwrap();
+    let status = desk.lab(&["status", "a"]);
+    status.with(4, &[]);
+    assert!(status.stdout.contains("small.json changed since it was run: spp, [1,16] → [1,4,16]"), "{}", status.stdout);
+    std::fs::write(desk.path("small.json"), "{").unwrap();
+    let status = desk.lab(&["status", "a"]);
+    status.with(0, &[]);
+    assert!(status.stdout.contains("note: small.json is not followed, what was run counts"), "{}", status.stdout);
 }
 
 #[test]
@@ -312,7 +354,7 @@ fn folders_that_do_not_belong_together_are_not_merged() {
         edited("b", file, from, to);
         desk.lab(&["merge", "a", "b", "--out", "m"]).with(2, parts);
         desk.lab(&["merge", "b", "a", "--out", "m"]).with(2, &[]);
-        assert!(!desk.path("m/results.jsonl").exists());
+        assert!(!desk.path("m").exists(), "a folder for nothing is left");
     }
     edited("b", "experiment.json", "\"metrics\": 1", "\"metrics\": 9");
     desk.lab(&["merge", "b", "--out", "m"]).with(2, &["found 9 for the metrics, which is 1 here"]);

@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use sampler_lab::error::Result;
 use sampler_lab::experiment::execute::{Options, Outcome, execute_locked};
 use sampler_lab::experiment::lab::Lab;
+use sampler_lab::experiment::origin::{Origin, recorded_name, shell_word};
 use sampler_lab::experiment::plan::plan;
 use sampler_lab::experiment::progress::{Progress, Tick};
 use sampler_lab::experiment::results::{Source, kind_name};
@@ -78,7 +79,8 @@ impl Run {
         let mut options = Options::new(self.work.threads(), self.command());
         options.fresh = self.fresh;
         options.shard = shard;
-        options.source = Some(Source { file: self.experiment.display().to_string(), sets: self.files.set.clone() });
+        options.source = Some(Source { file: recorded_name(&self.experiment), sets: self.files.set.clone() });
+        options.origin = Some(Origin { file: self.experiment.clone(), data: self.files.data.clone() });
         options.stop = Some(&stop);
         let bar = Bar::new(self.work.quiet);
         // Held until the report is written: it is about these rows.
@@ -126,11 +128,11 @@ impl Run {
         Ok(())
     }
 
-    /// The command that makes this folder, without what does not change a byte of it.
+    /// The command that makes this folder, without what does not change a byte of it, spelling among it.
     fn command(&self) -> String {
-        let mut command = format!("sampler-lab run {}", self.experiment.display());
+        let mut command = format!("sampler-lab run {}", shell_word(&recorded_name(&self.experiment)));
         for set in &self.files.set {
-            command += &format!(" --set '{set}'");
+            command += &format!(" --set {}", shell_word(set));
         }
         command
     }

@@ -61,10 +61,10 @@ pub struct LeftOut {
     pub same_as: String,
 }
 
-/// What to read again to plan the same experiment: as given on the command line, so relative to where that was given.
+/// What to read again to plan the same experiment.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Source {
-    /// The experiment file.
+    /// The experiment file as records call it ([`recorded_name`](super::origin::recorded_name)); `origin.json` leads to it.
     pub file: String,
     /// Keys changed in the scene files.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -23,6 +23,7 @@ use super::images::Images;
 use super::lines::{line, write_lines};
 use super::machine;
 use super::measure::{self, ReferenceImages};
+use super::origin::Origin;
 use super::plan::{EnsembleWork, ImageWork, Plan, PointsWork, ReferenceSource, ReferenceWork, Work, WorkItem};
 use super::progress::{Meter, Progress};
 use super::results::{
@@ -46,6 +47,8 @@ pub struct Options<'a> {
     pub command: String,
     /// Where the experiment was read from.
     pub source: Option<Source>,
+    /// The way to it on this machine, where it is to be written down.
+    pub origin: Option<Origin>,
     /// Do this part of the plan alone.
     pub shard: Option<Shard>,
     /// What the run may use.
@@ -61,7 +64,17 @@ impl Options<'_> {
     pub fn new(threads: usize, command: impl Into<String>) -> Self {
         let (limits, command) = (Limits::default(), command.into());
         let threads = threads.max(1);
-        Self { threads, fresh: false, command, source: None, shard: None, limits, at_most: None, stop: None }
+        Self {
+            threads,
+            fresh: false,
+            command,
+            source: None,
+            origin: None,
+            shard: None,
+            limits,
+            at_most: None,
+            stop: None,
+        }
     }
 }
 
@@ -160,6 +173,9 @@ pub fn execute_locked(
     let standing = settled(plan, out, progress)?;
     let survey = Survey::of_part(plan, &standing, out, options.threads, part.clone());
     folder::write_about(plan, out, &options.command, options.source.as_ref())?;
+    if let Some(origin) = &options.origin {
+        origin.write(out)?;
+    }
     if let Some(shard) = options.shard {
         folder::write_note(out, Some(ShardNote { count: shard.count }))?;
     }
