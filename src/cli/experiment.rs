@@ -22,7 +22,7 @@ use sampler_lab::report::{self, Written};
 use serde_json::json;
 
 use super::signals::stop_flag;
-use super::{SceneArgs, WorkArgs, print, print_json};
+use super::{SceneArgs, WorkArgs, print, print_json, say};
 
 /// Arguments of `run`.
 #[derive(Args)]
@@ -73,7 +73,7 @@ impl Run {
         }
         if !self.work.quiet {
             let part = shard.map_or(String::new(), |shard| format!(", shard {shard}"));
-            eprintln!("{} -> {}{part}\n{survey}", self.experiment.display(), out.display());
+            say(format_args!("{} -> {}{part}\n{survey}", self.experiment.display(), out.display()));
         }
         let stop = stop_flag()?;
         let mut options = Options::new(self.work.threads(), self.command());
@@ -86,10 +86,13 @@ impl Run {
         // Held until the report is written: it is about these rows.
         let (outcome, _lock) = execute_locked(&plan, &lab, &out, &bar, &options)?;
         bar.bar.finish_and_clear();
+        let status = Status::read(&plan, &out)?;
         if outcome.interrupted {
+            if self.json {
+                self.say(&out, &outcome, None, &status)?;
+            }
             return outcome.check();
         }
-        let status = Status::read(&plan, &out)?;
         // A part of the results has no report of its own; the last part makes the whole.
         let is_part = shard.is_some() && status.done < status.items;
         let written = if is_part { None } else { Some(report::write(&out)?) };
@@ -110,19 +113,20 @@ impl Run {
                 "done": outcome.done,
                 "failed": failed,
                 "samples": outcome.samples,
+                "interrupted": outcome.interrupted,
             }));
         }
         if !self.work.quiet {
             let Outcome { items, found, done, .. } = outcome;
-            eprintln!("{items} items: {found} found, {done} done, {failed} failed");
+            say(format_args!("{items} items: {found} found, {done} done, {failed} failed"));
             match written {
-                Some(written) => eprintln!("report: {}", written.report.display()),
-                None => eprintln!(
-                    "{} of all {} items are in {}; when every shard is done, `sampler-lab merge DIR… --out DIR` joins them and writes the report",
+                Some(written) => say(format_args!("report: {}", written.report.display())),
+                None => say(format_args!(
+                    "{} of all {} items are in {}, of which `sampler-lab report` writes a report; when every shard is done, `sampler-lab merge DIR… --out DIR` joins them and writes the report",
                     status.done,
                     status.items,
                     out.display()
-                ),
+                )),
             }
         }
         Ok(())
@@ -176,7 +180,7 @@ impl Bar {
         let text = format!("{}/{} items, {rate:.2} M samples/s{eta}  {label}", tick.items_done, tick.items);
         if let Some(last) = self.lines.as_ref().filter(|last| last.get().elapsed() >= Duration::from_secs(10)) {
             last.set(Instant::now());
-            eprintln!("{text}");
+            say(format_args!("{text}"));
         }
         self.bar.set_length(tick.samples.max(1));
         self.bar.set_position(tick.samples_done);
@@ -194,6 +198,6 @@ impl Progress for Bar {
     }
 
     fn warn(&self, message: &str) {
-        self.bar.suspend(|| eprintln!("note: {message}"));
+        self.bar.suspend(|| say(format_args!("note: {message}")));
     }
 }

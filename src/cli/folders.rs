@@ -17,7 +17,7 @@ use sampler_lab::report;
 use sampler_lab::scene::load::OpenOptions;
 use serde_json::{Value, json};
 
-use super::{print, print_json};
+use super::{print, print_json, say};
 
 /// Arguments of `report`.
 #[derive(Args)]
@@ -37,7 +37,7 @@ impl Report {
         let _lock = FolderLock::take(&self.folder)?;
         let written = report::write(&self.folder)?;
         if !self.quiet {
-            eprintln!("report: {}", written.report.display());
+            say(format_args!("report: {}", written.report.display()));
         }
         written.check()
     }
@@ -215,8 +215,8 @@ impl Merge {
                 "missing_shards": status.missing_shards.iter().map(ToString::to_string).collect::<Vec<_>>(),
             }))?;
         } else if !self.quiet {
-            eprintln!("{} of {} items joined, {} images copied", status.done, status.items, merged.images);
-            eprintln!("report: {}", written.report.display());
+            say(format_args!("{} of {} items joined, {} images copied", status.done, status.items, merged.images));
+            say(format_args!("report: {}", written.report.display()));
         }
         status.check(self.out.display())?;
         written.check()

@@ -77,5 +77,7 @@ pub struct Source {
 /// Kind `Input` where it is missing or does not read.
 pub fn read_about(path: &Path) -> Result<About> {
     let bad = |e: &dyn std::fmt::Display| Error::input(path.display(), format!("expected what was run, found: {e}"));
-    serde_json::from_slice(&std::fs::read(path).map_err(|e| bad(&e))?).map_err(|e| bad(&e))
+    let remedy = "take the file out, and `run` writes it again (without --fresh the rows stay)";
+    let damaged = |e: serde_json::Error| bad(&format!("{e}; {remedy}"));
+    serde_json::from_slice(&std::fs::read(path).map_err(|e| bad(&e))?).map_err(damaged)
 }

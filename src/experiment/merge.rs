@@ -120,6 +120,7 @@ impl Sources {
         }
         let images = carry_images(plan, &folders, &out, &rows)? + carry_references(plan, &folders, &out, &rows)?;
         made.0 = None;
+        folder::remove_report(&out)?;
         folder::write_about(plan, &out, &about.command, about.source.as_ref())?;
         if let Some(origin) = folders.iter().find_map(|folder| Origin::read(folder)) {
             origin.write(&out)?;
