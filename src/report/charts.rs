@@ -17,7 +17,7 @@ use super::pictures::{NamedPoints, point_set_contact_sheet};
 use super::plots::{Datum, Floor, Guide, Plot, Series, loglog_chart, small_multiples};
 use super::provenance;
 use super::shares::{Share, SharePanel, share_chart};
-use super::stability::{Against, count_against, passes_against};
+use super::stability::{Against, Stretch, count_against, passes_against};
 use super::summarise::{Subject, Summary};
 
 /// The points of the sheet's Figure 2.
@@ -182,8 +182,9 @@ pub fn stability(summary: &Summary) -> Option<Figure> {
     if asked.spp > 1 {
         kinds.push(format!("1 + {} spp in two passes", asked.spp - 1));
     }
+    let stretch = Stretch::of(summary);
     let dot = |kind: usize, against: Option<Against>| {
-        let excess = against?.excess;
+        let excess = stretch.stretched(&against?);
         Some(Dot { kind, value: excess.value, interval: ends(&excess) })
     };
     let row = |subject: &Subject| {
@@ -200,8 +201,18 @@ pub fn stability(summary: &Summary) -> Option<Figure> {
         })
         .filter(|group| !group.rows.is_empty())
         .collect();
-    let subtitle = format!("against one pass of {} spp; {}, 95 % intervals", asked.spp, replicates(summary));
-    let frame = frame(summary, "A sample more or less", &subtitle, ["RMSE / promised RMSE (no unit)", ""]);
+    let subtitle = format!(
+        "against one pass of {} spp; {}, 95 % intervals stretched for {}",
+        asked.spp,
+        replicates(summary),
+        counted(stretch.comparisons, "comparison", "comparisons")
+    );
+    let frame = frame(
+        summary,
+        "Other counts and two passes, against what is promised",
+        &subtitle,
+        ["RMSE / promised RMSE (no unit)", ""],
+    );
     Some(dot_chart(&frame, &kinds, 1.0, &groups))
 }
 

@@ -334,7 +334,14 @@ impl<'a> Panel<'a> {
             let below = (x, on_line(x - width).max(on_line(x)) + 11.0);
             [above, below].map(|at| (text(at).bounds(), at))
         });
-        if let Some((bounds, at)) = first_free(candidates, &self.b, taken) {
+        // Between the grid's vertical lines where there is room, so that none cuts the text.
+        let rulers = self.axes.x_ticks.iter().map(|&tick| self.x.pixel(tick));
+        let ruled: Vec<Bounds> = rulers
+            .map(|x| Bounds { left: x - 1.0, top: self.b.top, right: x + 1.0, bottom: self.b.bottom })
+            .chain(taken.iter().copied())
+            .collect();
+        let found = first_free(candidates.clone(), &self.b, &ruled).or_else(|| first_free(candidates, &self.b, taken));
+        if let Some((bounds, at)) = found {
             taken.push(bounds);
             drawing.add_text(text(at));
         }
