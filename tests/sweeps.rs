@@ -219,8 +219,8 @@ fn a_run_killed_at_twenty_random_moments_goes_on_to_the_bytes_of_one_that_was_no
 fn a_request_to_end_is_followed_inside_an_image_and_a_folder_has_one_writer_at_a_time() {
     let desk = Desk::new();
     for (name, out) in [("INT", "a"), ("TERM", "b")] {
-        let run = ["run", "endless.json", "--out", out, "--threads", "1"];
-        let mut child = desk.command(&run).stderr(Stdio::piped()).spawn().unwrap();
+        let run = ["run", "endless.json", "--out", out, "--threads", "1", "--json"];
+        let mut child = desk.command(&run).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let rows =
             || std::fs::read_to_string(desk.path(out).join("results.jsonl")).map_or(0, |text| text.lines().count());
         // The point set is done; the endless image begins.
@@ -237,6 +237,8 @@ fn a_request_to_end_is_followed_inside_an_image_and_a_folder_has_one_writer_at_a
         assert!(started.elapsed() < Duration::from_secs(60), "it waited for the image");
         let output = child.wait_with_output().unwrap();
         let stderr = String::from_utf8(output.stderr).unwrap();
+        let document: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert!(document["interrupted"] == true && document["done"] == 1, "{document}");
         assert_eq!(output.status.code(), Some(130), "{stderr}");
         assert!(stderr.contains("told to end with 1 of") && stderr.contains("the same command goes on"), "{stderr}");
         assert_eq!(rows(), 1);
@@ -274,8 +276,9 @@ fn shards_merged_in_any_order_are_the_run_that_was_not_cut() {
     desk.lab(&["merge", "1", "2", "--out", "2"]).with(4, &["missing shards: --shard 3/3"]);
     assert!(String::from_utf8(desk.bytes("2/report.md")).unwrap().contains("**Incomplete.**"));
     let status = desk.lab(&["status", "2", "--json"]).json();
+    let next = format!("sampler-lab run small.json --data {} --out 2 --shard 3/3", repository("data").display());
     assert_eq!(status["missing_shards"], serde_json::json!(["3/3"]));
-    assert_eq!(status["next"], serde_json::json!(["sampler-lab run small.json --out 2 --shard 3/3"]));
+    assert_eq!(status["next"], serde_json::json!([next]));
     desk.lab(&["merge", "3", "--out", "2"]).with(0, &[]);
     desk.assert_same("2", &expected);
     // More shards than there are groups, one after the other in one folder: the last one completes it.
@@ -283,6 +286,47 @@ fn shards_merged_in_any_order_are_the_run_that_was_not_cut() {
         desk.run("one-by-one", &["--shard", &format!("{index}/24")]).with(0, &[]);
     }
     desk.assert_same("one-by-one", &expected);
+}
+
+/// The path of the experiment file is no part of the results, however and wherever it is typed.
+#[test]
+fn shards_of_one_experiment_under_several_spellings_merge_to_the_same_bytes_in_any_order() {
+    let desk = Desk::new();
+    desk.run("whole", &[]).with(0, &[]);
+    let elsewhere = desk.path("else where");
+    std::fs::create_dir(&elsewhere).unwrap();
+    for file in ["small.json", "cornell.json"] {
+        std::fs::copy(desk.path(file), elsewhere.join(file)).unwrap();
+    }
+    desk.lab(&["run", "./small.json", "--shard", "1/2", "--out", "1", "--quiet"]).with(0, &[]);
+    desk.lab(&["run", "else where/../else where/small.json", "--shard", "2/2", "--out", "2", "--quiet"]).with(0, &[]);
+    for order in [["1", "2"], ["2", "1"]] {
+        let out = order.concat();
+        desk.lab(&[&["merge"], &order[..], &["--out", &out, "--quiet"]].concat()).with(0, &[]);
+        desk.assert_same(&out, &desk.results("whole"));
+    }
+    // What `status` says to do next is what a shell does.
+    let next = desk.lab(&["status", "2", "--json"]).json()["next"][0].as_str().unwrap().to_owned();
+    assert!(next.contains("run 'else where/small.json' --data ") && next.ends_with(" --shard 1/2"), "{next}");
+    let mut command = Command::new("sh");
+    let script = next.replacen("sampler-lab", env!("CARGO_BIN_EXE_sampler-lab"), 1);
+    command.current_dir(desk.0.path()).args(["-c", &script]).stdin(Stdio::null());
+    ended(command).with(0, &[]);
+    desk.assert_same("2", &desk.results("whole"));
+}
+
+#[test]
+fn status_sees_that_the_experiment_file_was_edited() {
+    let desk = Desk::new();
+    desk.run("a", &[]).with(0, &[]);
+    std::fs::write(desk.path("small.json"), SMALL.replace("[1, 16]", "[1, 4, 16]")).unwrap();
+    let status = desk.lab(&["status", "a"]);
+    status.with(4, &[]);
+    assert!(status.stdout.contains("small.json changed since it was run: spp, [1,16] → [1,4,16]"), "{}", status.stdout);
+    std::fs::write(desk.path("small.json"), "{").unwrap();
+    let status = desk.lab(&["status", "a"]);
+    status.with(0, &[]);
+    assert!(status.stdout.contains("note: small.json is not followed, what was run counts"), "{}", status.stdout);
 }
 
 #[test]
@@ -312,7 +356,7 @@ fn folders_that_do_not_belong_together_are_not_merged() {
         edited("b", file, from, to);
         desk.lab(&["merge", "a", "b", "--out", "m"]).with(2, parts);
         desk.lab(&["merge", "b", "a", "--out", "m"]).with(2, &[]);
-        assert!(!desk.path("m/results.jsonl").exists());
+        assert!(!desk.path("m").exists(), "a folder for nothing is left");
     }
     edited("b", "experiment.json", "\"metrics\": 1", "\"metrics\": 9");
     desk.lab(&["merge", "b", "--out", "m"]).with(2, &["found 9 for the metrics, which is 1 here"]);
@@ -460,6 +504,104 @@ fn torn_and_damaged_files_are_noticed_and_made_good() {
         desk.lab(args).with(2, &["a/results.jsonl:1: expected a row", "take this line out"]);
     }
     assert_eq!(files(&desk.path("a")), before);
+}
+
+/// Edits that leave a row readable: of what the plan knows, of the digest of the pixels, and of a timing.
+#[test]
+fn altered_rows_and_unreadable_timings_are_named_and_done_again() {
+    let desk = Desk::new();
+    desk.run("a", &[]).with(0, &[]);
+    let expected = desk.results("a");
+    let text = String::from_utf8(expected[0].clone()).unwrap();
+    let altered = |kind: &str, from: &str, to: &str| {
+        let is_it = |line: &str| line.contains(&format!("\"kind\":\"{kind}\"")) && line.contains(from);
+        let at = text.lines().position(is_it).unwrap_or_else(|| panic!("{kind} {from}"));
+        let line = text.lines().nth(at).unwrap();
+        std::fs::write(desk.path("a/results.jsonl"), text.replacen(line, &line.replacen(from, to, 1), 1)).unwrap();
+        at + 1
+    };
+    for (kind, from, to) in [
+        ("render", "\"size\":\"16x16\"", "\"size\":\"16x17\""),
+        ("ensemble", "\"replicates\":3", "\"replicates\":4"),
+        ("points", "\"taken\":16", "\"taken\":17"),
+        ("reference", "\"scene\":\"cornell\"", "\"scene\":\"horizon\""),
+    ] {
+        altered(kind, from, to);
+        assert_eq!(desk.status("a"), (4, vec!["row altered".to_owned()]), "{kind}");
+        desk.run("a", &[]).with(0, &["1 rows put aside in superseded.jsonl: the row says another "]);
+        desk.assert_same("a", &expected);
+    }
+    // A digest says nothing that the plan knows. It comes to light where the image is needed: here for an ensemble.
+    let digest = |line: &str| line.split("\"pixels\":\"").nth(1).unwrap()[..4].to_owned();
+    let render = text.lines().find(|line| line.contains("\"kind\":\"render\"")).unwrap();
+    let at = altered("render", &format!("\"pixels\":\"{}", digest(render)), "\"pixels\":\"zzzz");
+    let rows = String::from_utf8(desk.bytes("a/results.jsonl")).unwrap();
+    let without: String = rows.split_inclusive('\n').filter(|line| !line.contains("\"kind\":\"ensemble\"")).collect();
+    std::fs::write(desk.path("a/results.jsonl"), without).unwrap();
+    desk.run("a", &[]).with(0, &[&format!("a/results.jsonl:{at}: expected the pixels of the image on disk")]);
+    desk.assert_same("a", &expected);
+    // Seconds are no result: nothing is held up for them. Nor for a byte that is no text among what was put aside.
+    let timings = String::from_utf8(desk.bytes("a/timings.jsonl")).unwrap();
+    std::fs::write(desk.path("a/timings.jsonl"), timings.replacen("\"seconds\":", "\"seconds\"", 2)).unwrap();
+    let mut aside = desk.bytes("a/superseded.jsonl");
+    aside.extend(b"\xff\n");
+    std::fs::write(desk.path("a/superseded.jsonl"), aside).unwrap();
+    assert_eq!(desk.status("a"), (0, vec![]));
+    desk.run("a", &[]).with(0, &["a/timings.jsonl:1: ", "the line is left out"]);
+    desk.assert_same("a", &expected);
+    // Without the file that says what was run, the rows are still there.
+    std::fs::write(desk.path("a/experiment.json"), "").unwrap();
+    desk.run("a", &[]).with(2, &["a/experiment.json: ", "take the file out"]);
+    std::fs::remove_file(desk.path("a/experiment.json")).unwrap();
+    desk.run("a", &["--fresh"]).with(2, &["a: expected results to forget"]);
+    assert_eq!(desk.run("a", &["--json"]).json()["done"], 0);
+    desk.assert_same("a", &expected);
+}
+
+#[test]
+fn fresh_forgets_what_it_is_to_do_again_and_nothing_else() {
+    let desk = Desk::new();
+    desk.run("a", &[]).with(0, &[]);
+    let expected = desk.results("a");
+    let document = desk.run("a", &["--fresh", "--shard", "3/3", "--json"]).with(0, &[]).json();
+    assert!(document["done"].as_u64() > Some(0) && document["done"] == document["items"], "{document}");
+    desk.assert_same("a", &expected);
+    std::fs::write(desk.path("a/images/mine.exr"), "mine").unwrap();
+    desk.run("a", &["--fresh"]).with(0, &[]);
+    desk.assert_same("a", &expected);
+    assert_eq!(desk.bytes("a/images/mine.exr"), b"mine");
+    std::fs::create_dir(desk.path("b")).unwrap();
+    std::fs::write(desk.path("b/results.jsonl"), "mine").unwrap();
+    desk.run("b", &["--fresh"]).with(2, &["b: expected results to forget", "found results.jsonl"]);
+    assert_eq!(files(&desk.path("b")).len(), 1);
+}
+
+/// A report says what the rows beside it say, or is not there.
+#[test]
+fn no_old_report_stands_beside_new_rows() {
+    let desk = Desk::new();
+    desk.run("a", &[]).with(0, &[]);
+    std::fs::write(desk.path("small.json"), SMALL.replace("[1, 16]", "[1, 4, 16]")).unwrap();
+    desk.run("a", &["--shard", "3/3"]).with(0, &[]);
+    for name in ["report.md", "summary.csv", "slopes.csv"] {
+        assert!(!desk.path("a").join(name).exists(), "{name}");
+    }
+    desk.lab(&["report", "a"]).with(4, &["missing"]);
+    desk.run("a", &[]).with(0, &[]);
+    desk.run("whole", &[]).with(0, &[]);
+    desk.assert_same("a", &desk.results("whole"));
+}
+
+/// `/dev/full` refuses every byte.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_stderr_that_cannot_be_written_to_is_no_failure() {
+    let desk = Desk::new();
+    let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let status = desk.command(&["run", "small.json", "--out", "a"]).stderr(full()).status().unwrap();
+    assert_eq!(status.code(), Some(0));
+    let status = desk.command(&["run", "nowhere.json", "--out", "b"]).stderr(full()).status().unwrap();
+    assert_eq!(status.code(), Some(2));
 }
 
 #[test]

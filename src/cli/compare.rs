@@ -10,7 +10,7 @@ use sampler_lab::error::{Error, Result};
 use sampler_lab::film::{Picture, read_picture, write_exr, write_pfm};
 use sampler_lab::report::pictures::{error_map, error_scale};
 
-use super::{print, print_json};
+use super::{print, print_json, say};
 
 /// Arguments of `compare`.
 #[derive(Args)]
@@ -136,7 +136,7 @@ impl Compare {
     fn note(&self, path: &Path, notes: &[String]) {
         if !self.quiet {
             for note in notes {
-                eprintln!("note: {}: {note}", path.display());
+                say(format_args!("note: {}: {note}", path.display()));
             }
         }
     }

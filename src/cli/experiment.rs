@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use sampler_lab::error::Result;
 use sampler_lab::experiment::execute::{Options, Outcome, execute_locked};
 use sampler_lab::experiment::lab::Lab;
+use sampler_lab::experiment::origin::{Origin, recorded_name, shell_word};
 use sampler_lab::experiment::plan::plan;
 use sampler_lab::experiment::progress::{Progress, Tick};
 use sampler_lab::experiment::results::{Source, kind_name};
@@ -21,7 +22,7 @@ use sampler_lab::report::{self, Written};
 use serde_json::json;
 
 use super::signals::stop_flag;
-use super::{SceneArgs, WorkArgs, print, print_json};
+use super::{SceneArgs, WorkArgs, print, print_json, say};
 
 /// Arguments of `run`.
 #[derive(Args)]
@@ -72,22 +73,26 @@ impl Run {
         }
         if !self.work.quiet {
             let part = shard.map_or(String::new(), |shard| format!(", shard {shard}"));
-            eprintln!("{} -> {}{part}\n{survey}", self.experiment.display(), out.display());
+            say(format_args!("{} -> {}{part}\n{survey}", self.experiment.display(), out.display()));
         }
         let stop = stop_flag()?;
         let mut options = Options::new(self.work.threads(), self.command());
         options.fresh = self.fresh;
         options.shard = shard;
-        options.source = Some(Source { file: self.experiment.display().to_string(), sets: self.files.set.clone() });
+        options.source = Some(Source { file: recorded_name(&self.experiment), sets: self.files.set.clone() });
+        options.origin = Some(Origin { file: self.experiment.clone(), data: self.files.data.clone() });
         options.stop = Some(&stop);
         let bar = Bar::new(self.work.quiet);
         // Held until the report is written: it is about these rows.
         let (outcome, _lock) = execute_locked(&plan, &lab, &out, &bar, &options)?;
         bar.bar.finish_and_clear();
+        let status = Status::read(&plan, &out)?;
         if outcome.interrupted {
+            if self.json {
+                self.say(&out, &outcome, None, &status)?;
+            }
             return outcome.check();
         }
-        let status = Status::read(&plan, &out)?;
         // A part of the results has no report of its own; the last part makes the whole.
         let is_part = shard.is_some() && status.done < status.items;
         let written = if is_part { None } else { Some(report::write(&out)?) };
@@ -108,29 +113,30 @@ impl Run {
                 "done": outcome.done,
                 "failed": failed,
                 "samples": outcome.samples,
+                "interrupted": outcome.interrupted,
             }));
         }
         if !self.work.quiet {
             let Outcome { items, found, done, .. } = outcome;
-            eprintln!("{items} items: {found} found, {done} done, {failed} failed");
+            say(format_args!("{items} items: {found} found, {done} done, {failed} failed"));
             match written {
-                Some(written) => eprintln!("report: {}", written.report.display()),
-                None => eprintln!(
-                    "{} of all {} items are in {}; when every shard is done, `sampler-lab merge DIR… --out DIR` joins them and writes the report",
+                Some(written) => say(format_args!("report: {}", written.report.display())),
+                None => say(format_args!(
+                    "{} of all {} items are in {}, of which `sampler-lab report` writes a report; when every shard is done, `sampler-lab merge DIR… --out DIR` joins them and writes the report",
                     status.done,
                     status.items,
                     out.display()
-                ),
+                )),
             }
         }
         Ok(())
     }
 
-    /// The command that makes this folder, without what does not change a byte of it.
+    /// The command that makes this folder, without what does not change a byte of it, spelling among it.
     fn command(&self) -> String {
-        let mut command = format!("sampler-lab run {}", self.experiment.display());
+        let mut command = format!("sampler-lab run {}", shell_word(&recorded_name(&self.experiment)));
         for set in &self.files.set {
-            command += &format!(" --set '{set}'");
+            command += &format!(" --set {}", shell_word(set));
         }
         command
     }
@@ -174,7 +180,7 @@ impl Bar {
         let text = format!("{}/{} items, {rate:.2} M samples/s{eta}  {label}", tick.items_done, tick.items);
         if let Some(last) = self.lines.as_ref().filter(|last| last.get().elapsed() >= Duration::from_secs(10)) {
             last.set(Instant::now());
-            eprintln!("{text}");
+            say(format_args!("{text}"));
         }
         self.bar.set_length(tick.samples.max(1));
         self.bar.set_position(tick.samples_done);
@@ -192,6 +198,6 @@ impl Progress for Bar {
     }
 
     fn warn(&self, message: &str) {
-        self.bar.suspend(|| eprintln!("note: {message}"));
+        self.bar.suspend(|| say(format_args!("note: {message}")));
     }
 }

@@ -14,7 +14,7 @@ use sampler_lab::scene::compile::{Scene, Stage};
 use sampler_lab::scene::config::Estimator;
 use serde_json::json;
 
-use super::{DecisionArgs, SceneArgs, WorkArgs, print_json};
+use super::{DecisionArgs, SceneArgs, WorkArgs, print_json, say};
 
 /// Arguments of `render`.
 #[derive(Args)]
@@ -94,7 +94,7 @@ impl Render {
         let samples = size.pixels() * u64::from(sampler.samples());
         if !self.work.quiet {
             let bytes = scene.bytes() as u64 + 24 * size.pixels();
-            eprintln!(
+            say(format_args!(
                 "{} at {size}, {} samples a pixel of {}; about {} MB",
                 self.scene.display(),
                 sampler.samples(),
@@ -103,8 +103,8 @@ impl Render {
                     None => set.expansion(),
                 },
                 bytes / 1_000_000 + 1
-            );
-            eprintln!("{}: {}", stage.name(), scene.layout);
+            ));
+            say(format_args!("{}: {}", stage.name(), scene.layout));
         }
         check_writable(&out)?;
         let bar = bar(samples, self.work.quiet);
@@ -133,12 +133,12 @@ impl Render {
         }
         let per_second = |count: u64| count as f64 / render_seconds.max(1e-9);
         if !self.work.quiet {
-            eprintln!(
+            say(format_args!(
                 "{}: load {load_seconds:.3} s, build {build_seconds:.3} s, render {render_seconds:.3} s, {:.2} M samples/s, {:.2} M rays/s",
                 out.display(),
                 per_second(samples) / 1e6,
                 per_second(rendered.rays) / 1e6
-            );
+            ));
         }
         if self.json {
             let own = Decision::ALL.map(|d| (d.key().replace('-', "_"), json!(set.of(d).to_string())));

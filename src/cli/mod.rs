@@ -123,7 +123,7 @@ impl WorkArgs {
     fn warn(&self, warnings: &[String]) {
         if !self.quiet {
             for warning in warnings {
-                eprintln!("note: {warning}");
+                say(format_args!("note: {warning}"));
             }
         }
     }
@@ -180,6 +180,11 @@ impl DecisionArgs {
     }
 }
 
+/// Says something on stderr, which is no result: where nobody can hear it the work goes on.
+pub fn say(text: impl std::fmt::Display) {
+    let _ = std::io::stderr().lock().write_all(format!("{text}\n").as_bytes());
+}
+
 /// Writes a result to stdout; a reader that has gone away ends the program quietly.
 fn print(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
@@ -223,14 +228,14 @@ impl Config {
             ConfigAction::Show(args) => {
                 let config = SceneConfig::read(&args.file, &args.scene.set)?;
                 for warning in config.warnings() {
-                    eprintln!("note: {warning}");
+                    say(format_args!("note: {warning}"));
                 }
                 print(&config.to_json())
             }
             ConfigAction::Check(args) => {
                 let loaded = args.scene.open(&args.file)?;
                 for warning in &loaded.warnings {
-                    eprintln!("note: {warning}");
+                    say(format_args!("note: {warning}"));
                 }
                 let framebuffer = loaded.config.framebuffer;
                 let triangles = loaded.mesh.len();
@@ -270,7 +275,7 @@ impl Explain {
             let framebuffer = loaded.config.framebuffer;
             let scene = Scene::new(&loaded.config, loaded.mesh, (framebuffer.res_w, framebuffer.res_h), Stage::Final)?;
             for note in self.decisions.notes(path, &scene.layout) {
-                eprintln!("note: {note}");
+                say(format_args!("note: {note}"));
             }
             text += &format!("\n{}: {}\n", path.display(), scene.layout);
             text += &layout_table(&set, &scene.layout);

@@ -12,7 +12,7 @@ use sampler_lab::sampling::{MAX_SAMPLES, Preset, SamplerSpec, point_set};
 use sampler_lab::stats::Points;
 use serde_json::json;
 
-use super::{WorkArgs, print, print_json};
+use super::{WorkArgs, print, print_json, say};
 
 /// The sheet's five samplers.
 const SHEET: [&str; 5] = ["uniform", "stratified", "halton", "hammersley", "ld"];
@@ -80,13 +80,13 @@ impl DrawPoints {
             let file = self.out.join(format!("{stem}.{ending}"));
             write_whole(&file, text.as_bytes())?;
             if !self.quiet {
-                eprintln!(
+                say(format_args!(
                     "{name} = {}: {} points, seed {}: {} and .png",
                     spec.expansion(),
                     points.len(),
                     self.seed,
                     file.display()
-                );
+                ));
             }
         }
         Ok(())

@@ -61,10 +61,10 @@ pub struct LeftOut {
     pub same_as: String,
 }
 
-/// What to read again to plan the same experiment: as given on the command line, so relative to where that was given.
+/// What to read again to plan the same experiment.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Source {
-    /// The experiment file.
+    /// The experiment file as records call it ([`recorded_name`](super::origin::recorded_name)); `origin.json` leads to it.
     pub file: String,
     /// Keys changed in the scene files.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -77,5 +77,7 @@ pub struct Source {
 /// Kind `Input` where it is missing or does not read.
 pub fn read_about(path: &Path) -> Result<About> {
     let bad = |e: &dyn std::fmt::Display| Error::input(path.display(), format!("expected what was run, found: {e}"));
-    serde_json::from_slice(&std::fs::read(path).map_err(|e| bad(&e))?).map_err(|e| bad(&e))
+    let remedy = "take the file out, and `run` writes it again (without --fresh the rows stay)";
+    let damaged = |e: serde_json::Error| bad(&format!("{e}; {remedy}"));
+    serde_json::from_slice(&std::fs::read(path).map_err(|e| bad(&e))?).map_err(damaged)
 }

@@ -23,10 +23,11 @@ use super::images::Images;
 use super::lines::{line, write_lines};
 use super::machine;
 use super::measure::{self, ReferenceImages};
+use super::origin::Origin;
 use super::plan::{EnsembleWork, ImageWork, Plan, PointsWork, ReferenceSource, ReferenceWork, Work, WorkItem};
 use super::progress::{Meter, Progress};
 use super::results::{
-    self, EnsembleRow, ImageErrors, ImageRow, Kind, PointsRow, ReferenceRow, Row, SCHEMA, Source, Timing,
+    self, EnsembleRow, ImageErrors, ImageRow, Kind, PointsRow, ReferenceRow, Row, SCHEMA, Source, Timing, read_image,
 };
 use super::shards::Shard;
 use super::status::stale_rows;
@@ -46,6 +47,8 @@ pub struct Options<'a> {
     pub command: String,
     /// Where the experiment was read from.
     pub source: Option<Source>,
+    /// The way to it on this machine, where it is to be written down.
+    pub origin: Option<Origin>,
     /// Do this part of the plan alone.
     pub shard: Option<Shard>,
     /// What the run may use.
@@ -61,7 +64,17 @@ impl Options<'_> {
     pub fn new(threads: usize, command: impl Into<String>) -> Self {
         let (limits, command) = (Limits::default(), command.into());
         let threads = threads.max(1);
-        Self { threads, fresh: false, command, source: None, shard: None, limits, at_most: None, stop: None }
+        Self {
+            threads,
+            fresh: false,
+            command,
+            source: None,
+            origin: None,
+            shard: None,
+            limits,
+            at_most: None,
+            stop: None,
+        }
     }
 }
 
@@ -91,6 +104,8 @@ pub struct Outcome {
     pub interrupted: bool,
     /// Samples rendered.
     pub samples: u64,
+    /// Whether it began with forgetting what was there.
+    pub fresh: bool,
 }
 
 impl Outcome {
@@ -103,8 +118,11 @@ impl Outcome {
         let missing = self.items - self.found - self.done;
         if self.interrupted {
             let done = self.found + self.done;
-            let what =
-                format!("told to end with {done} of {} items done; the same command goes on from there", self.items);
+            let without = if self.fresh { " without --fresh" } else { "" };
+            let what = format!(
+                "told to end with {done} of {} items done; the same command{without} goes on from there",
+                self.items
+            );
             return Err(Error::interrupted("run", what));
         }
         match self.failures.first() {
@@ -150,20 +168,31 @@ pub fn execute_locked(
     let first_look = if options.fresh { Standing::nothing(plan) } else { Standing::read(plan, out)? };
     let survey = Survey::of_part(plan, &first_look, out, options.threads, part.clone());
     survey.refuse_above(&options.limits, &plan.experiment.place)?;
-    if !options.fresh {
+    if options.fresh {
+        folder::refuse_to_forget(out)?;
+    }
+    if !options.fresh || options.shard.is_some() {
         folder::refuse_another_experiment(plan, out)?;
     }
     let lock = FolderLock::take(out)?;
-    if options.fresh {
-        folder::forget(out)?;
+    match options.shard {
+        _ if !options.fresh => {}
+        None => folder::forget(out)?,
+        Some(_) => folder::forget_part(plan, out, part.clone())?,
     }
     let standing = settled(plan, out, progress)?;
     let survey = Survey::of_part(plan, &standing, out, options.threads, part.clone());
     folder::write_about(plan, out, &options.command, options.source.as_ref())?;
+    if let Some(origin) = &options.origin {
+        origin.write(out)?;
+    }
     if let Some(shard) = options.shard {
         folder::write_note(out, Some(ShardNote { count: shard.count }))?;
     }
     let found = standing.states[part.clone()].iter().filter(|&&state| state == State::Done).count();
+    if standing.states[part.clone()].iter().any(|state| !matches!(state, State::Done | State::Optional)) {
+        folder::remove_report(out)?;
+    }
     let is_else_done = |run: &Run| {
         let mut others = (0..plan.items.len()).filter(|position| !part.contains(position));
         others.all(|position| matches!(run.states[position], State::Done | State::Optional))
@@ -171,7 +200,8 @@ pub fn execute_locked(
     let wanted = standing.states[part.clone()].iter().filter(|&&state| state != State::Optional).count();
     let meter = Meter::new(found, wanted, survey.samples_left);
     let mut run = Run::new(plan, backend, out, progress, options, standing, meter)?;
-    let (done, interrupted) = run.all_items(&part)?;
+    let (done, mut interrupted) = run.all_items(&part)?;
+    interrupted |= !interrupted && run.right_wrong_rows()?;
     if !interrupted {
         run.keep_references()?;
         run.write_in_plan_order()?;
@@ -182,12 +212,15 @@ pub fn execute_locked(
     }
     let tick = run.meter.tick();
     let (items, found, samples) = (tick.items, tick.items_done - done, tick.samples_done);
-    Ok((Outcome { items, found, done, failures: run.failures, interrupted, samples }, lock))
+    Ok((Outcome { items, found, done, failures: run.failures, interrupted, samples, fresh: options.fresh }, lock))
 }
 
 /// What the folder holds of the plan, after what no longer belongs to it was put aside, and what does again is back.
 fn settled(plan: &Plan, out: &Path, progress: &dyn Progress) -> Result<Standing> {
     let standing = Standing::read(plan, out)?;
+    for what in &standing.unsound_timings {
+        progress.warn(&format!("{what}; the line is left out, its seconds are lost"));
+    }
     let settled = superseded::settle(plan, out, &standing)?;
     for (why, count) in stale_rows(plan, &settled.aside) {
         progress.warn(&format!("{count} rows put aside in superseded.jsonl: {why}"));
@@ -240,6 +273,8 @@ struct Run<'a> {
     /// Images that could not be made, by id: whatever needs one fails for the same reason.
     failed_images: HashMap<String, Error>,
     failures: Vec<Failure>,
+    /// Ids of items whose rows turned out to be wrong: done again at the end.
+    wrong_rows: Vec<String>,
     results_log: Log,
     timings_log: Log,
     meter: Meter,
@@ -273,6 +308,7 @@ impl<'a> Run<'a> {
             states,
             failed_images: HashMap::new(),
             failures: Vec::new(),
+            wrong_rows: Vec::new(),
             results_log: Log::open(results_path)?,
             timings_log: Log::open(timings_path)?,
             meter,
@@ -302,6 +338,36 @@ impl<'a> Run<'a> {
             self.images.release(released);
         }
         Ok((done, false))
+    }
+
+    /// Does the items again whose rows turned out to be wrong; whether it was told to end. They count as done already.
+    fn right_wrong_rows(&mut self) -> Result<bool> {
+        while let Some(id) = self.wrong_rows.pop() {
+            let plan = self.plan;
+            let item = &plan.items[plan.position(&id).expect("images are the plan's")];
+            if self.rows.contains_key(&id) {
+                continue;
+            }
+            match self.row_of(item).and_then(|row| self.record(item, row)) {
+                Ok(()) => {}
+                Err(error) if error.kind == ErrorKind::Interrupted => return Ok(true),
+                Err(error) if error.kind == ErrorKind::Write => return Err(error),
+                Err(error) => self.failures.push(Failure { id, label: item.label(), error }),
+            }
+        }
+        Ok(false)
+    }
+
+    /// File and line of an item's row.
+    fn place_of_row(&self, id: &str) -> String {
+        let path = results::results_path(self.out);
+        let text = std::fs::read(&path).unwrap_or_default();
+        let named = format!("\"id\":\"{id}\"");
+        let is_row = |line: &[u8]| line.windows(named.len()).any(|part| part == named.as_bytes());
+        let mut lines = text.split(|&byte| byte == b'\n').map(is_row).collect::<Vec<_>>().into_iter();
+        lines
+            .rposition(|is_row| is_row)
+            .map_or(format!("{}", path.display()), |at| format!("{}:{}", path.display(), at + 1))
     }
 
     /// Does one item; whether it could be done.
@@ -526,6 +592,19 @@ impl<'a> Run<'a> {
         measure::check_finite(&image, &item.label())?;
         let found = pixel_hash(&image.pixels);
         if let Some(expected) = pixels
+            && expected != found
+            && read_image(self.out, &item.id, Some(&found)).is_ok()
+        {
+            // Two makings of one picture agree: it is the row that is wrong.
+            let place = self.place_of_row(&item.id);
+            self.progress.warn(&format!(
+                "{place}: expected the pixels of the image on disk and of one made again, {found}, found {expected}; the row is put aside and its item done again"
+            ));
+            if let Some(row) = self.rows.remove(&item.id) {
+                superseded::put_aside(self.out, std::iter::once(&row))?;
+            }
+            self.wrong_rows.push(item.id.clone());
+        } else if let Some(expected) = pixels
             && expected != found
         {
             let what = format!(

@@ -1,15 +1,19 @@
 //! The output folder as a thing that one process at a time writes to, and what a kill may have left in it.
 
+use std::collections::HashSet;
 use std::fs::File;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::lines::{line, write_if_changed};
+use super::identity::ID_LENGTH;
+use super::lines::{line, write_if_changed, write_lines};
 use super::plan::Plan;
 use super::results::{self, About, SCHEMA, Source};
 use super::shards::Shard;
-use super::superseded::superseded_path;
+use super::superseded::{self, superseded_path};
+use super::survey::Standing;
 use crate::error::{Error, Result};
 
 /// The right to write to a folder, as long as it is held. The system lets go of it with the process.
@@ -96,26 +100,86 @@ pub fn refuse_another_experiment(plan: &Plan, out: &Path) -> Result<()> {
     Err(Error::input(path.display(), what))
 }
 
-/// Removes the rows, timings and images of earlier runs, and nothing else.
+/// What is in a folder is only forgotten where it is results: files of others are not ours to remove.
+///
+/// # Errors
+/// Kind `Input` where there is something and no `experiment.json` of ours.
+pub fn refuse_to_forget(out: &Path) -> Result<()> {
+    let path = results::about_path(out);
+    if path.exists() {
+        return results::read_about(&path).map(|_| ());
+    }
+    let names = std::fs::read_dir(out).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.file_name()));
+    match names.map(|name| name.to_string_lossy().into_owned()).filter(|name| name != ".lock").min() {
+        None => Ok(()),
+        Some(name) => {
+            let what = format!(
+                "expected results to forget, with their experiment.json, or an empty folder, found {name}; give another --out, or leave out --fresh"
+            );
+            Err(Error::input(out.display(), what))
+        }
+    }
+}
+
+/// Removes the report, which is about the rows that were there: `report` writes one of those that are there at any time.
+///
+/// # Errors
+/// Kind `Write` where something cannot be removed.
+pub fn remove_report(out: &Path) -> Result<()> {
+    let names = ["report.md", "summary.csv", "slopes.csv", "stability.csv"];
+    remove(names.iter().map(|name| out.join(name)))
+}
+
+fn remove(paths: impl Iterator<Item = PathBuf>) -> Result<()> {
+    for path in paths.filter(|path| path.exists()) {
+        std::fs::remove_file(&path).map_err(|e| Error::write(&path, format!("cannot remove: {e}")))?;
+    }
+    Ok(())
+}
+
+/// Whether a name is that of an image which a run writes: of an item, or of a reference.
+fn is_image_of_ours(name: &str) -> bool {
+    let Some(stem) = name.strip_suffix(".exr") else { return false };
+    let is_id = stem.len() == ID_LENGTH && stem.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'));
+    is_id || (stem.starts_with("reference-") && ["-A", "-B", "-exact"].iter().any(|part| stem.ends_with(part)))
+}
+
+/// Removes what earlier runs left of the items at `part` of the plan – rows, timings, images, also those put aside –
+/// and the report.
+///
+/// # Errors
+/// Kind `Input` where rows do not read, kind `Write` where something cannot be written or removed.
+pub fn forget_part(plan: &Plan, out: &Path, part: Range<usize>) -> Result<()> {
+    let standing = Standing::read(plan, out)?;
+    let ids: HashSet<&str> = plan.items[part].iter().map(|item| item.id.as_str()).collect();
+    remove_report(out)?;
+    superseded::forget(out, &ids)?;
+    let rows = standing.in_file.iter().filter(|row| !ids.contains(row.id()));
+    write_lines(&results::results_path(out), rows)?;
+    let mut timings: Vec<_> = standing.timings.values().filter(|timing| !ids.contains(timing.id.as_str())).collect();
+    timings.sort_by(|a, b| a.id.cmp(&b.id));
+    write_lines(&results::timings_path(out), timings.into_iter())?;
+    remove(ids.iter().map(|id| results::image_path(out, id)))
+}
+
+/// Removes the rows, timings, images and the report of earlier runs, and nothing else.
 ///
 /// # Errors
 /// Kind `Write` where something cannot be removed.
 pub fn forget(out: &Path) -> Result<()> {
     let fail = |path: &Path, e: std::io::Error| Error::write(path, format!("cannot remove: {e}"));
+    remove_report(out)?;
     let mut paths = vec![results::results_path(out), results::timings_path(out), superseded_path(out), note_path(out)];
     let images = out.join("images");
     if images.is_dir() {
         for entry in std::fs::read_dir(&images).map_err(|e| fail(&images, e))? {
             let path = entry.map_err(|e| fail(&images, e))?.path();
-            if path.extension().is_some_and(|ending| ending == "exr") {
+            if path.file_name().is_some_and(|name| is_image_of_ours(&name.to_string_lossy())) {
                 paths.push(path);
             }
         }
     }
-    for path in paths.iter().filter(|path| path.exists()) {
-        std::fs::remove_file(path).map_err(|e| fail(path, e))?;
-    }
-    Ok(())
+    remove(paths.into_iter())
 }
 
 /// Writes down what is run here.
@@ -137,6 +201,9 @@ pub fn write_about(plan: &Plan, out: &Path, command: &str, source: Option<&Sourc
     let path = results::about_path(out);
     let mut text = serde_json::to_string_pretty(&about).map_err(|e| Error::write(&path, e))?;
     text.push('\n');
+    if std::fs::read(&path).is_ok_and(|old| old != text.as_bytes()) {
+        remove_report(out)?;
+    }
     write_if_changed(&path, text.as_bytes())
 }
 

@@ -50,6 +50,43 @@ pub fn lines_if_any<T>(path: &Path, parse: impl Fn(&str) -> std::result::Result<
     }
 }
 
+/// The lines of a file that read, and what is to be said of the others.
+pub struct Sound<T> {
+    /// The lines that read.
+    pub values: Vec<T>,
+    /// Place and fault of each line that does not, but for a torn last one.
+    pub unsound: Vec<String>,
+    /// Whether the file is exactly its sound lines.
+    pub is_clean: bool,
+}
+
+/// As [`lines_if_any`], for what may be lost: a line that does not read is left out and named.
+///
+/// # Errors
+/// Kind `Input` where the file is there and cannot be read.
+pub fn sound_lines<T>(path: &Path, parse: impl Fn(&str) -> std::result::Result<T, String>) -> Result<Sound<T>> {
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Vec::new(),
+        Err(e) => return Err(unreadable(path, &e)),
+    };
+    let (mut values, mut unsound) = (Vec::new(), Vec::new());
+    let mut is_clean = bytes.is_empty() || bytes.ends_with(b"\n");
+    for (number, bytes) in bytes.split_inclusive(|&byte| byte == b'\n').enumerate() {
+        let text = std::str::from_utf8(bytes).map_err(|e| e.to_string());
+        match text.and_then(|text| parse(text.trim_end())) {
+            Ok(value) => values.push(value),
+            Err(what) => {
+                is_clean = false;
+                if bytes.ends_with(b"\n") {
+                    unsound.push(format!("{}:{}: {what}", path.display(), number + 1));
+                }
+            }
+        }
+    }
+    Ok(Sound { values, unsound, is_clean })
+}
+
 /// Writes a file of one JSON value a line, whole or not at all; not touched where it would not change.
 pub fn write_lines<'a, T: Serialize + 'a>(path: &Path, values: impl Iterator<Item = &'a T>) -> Result<()> {
     let mut text = String::new();

@@ -9,6 +9,7 @@ use serde_json::Value;
 use super::execute::write_in_plan_order;
 use super::folder::{self, FolderLock, ShardNote};
 use super::images::stored;
+use super::origin::Origin;
 use super::plan::{Plan, Work};
 use super::results::{self, About, Row, SceneFacts, Timing, read_image_at};
 use super::status::Status;
@@ -26,7 +27,22 @@ pub struct Sources {
     /// Into how many shards the experiment was cut, where a folder says so.
     shards: Option<u32>,
     lock: FolderLock,
+    made: Made,
     _shared: Vec<Option<FolderLock>>,
+}
+
+/// A folder that was made for a merge: gone again where nothing comes of it.
+#[derive(Debug)]
+struct Made(Option<PathBuf>);
+
+impl Drop for Made {
+    fn drop(&mut self) {
+        if let Some(out) = &self.0 {
+            // Best effort: a folder that something is in stays.
+            let _ = std::fs::remove_file(out.join(".lock"));
+            let _ = std::fs::remove_dir(out);
+        }
+    }
 }
 
 /// What came of a merge.
@@ -68,9 +84,13 @@ impl Sources {
             all.iter().map(|folder| folder::read_note(folder)).collect::<Result<_>>()?;
         let shared = all.iter().filter(|folder| !is_out(folder)).map(|folder| FolderLock::share(folder));
         let shared = shared.collect::<Result<_>>()?;
+        // What may differ – the version, what an earlier one wrote – is the same one's whatever the order.
+        let about = abouts.iter().min_by_key(|about| super::lines::line(about)).unwrap_or(about).clone();
+        let made = Made((!out.exists()).then(|| out.to_owned()));
         Ok(Self {
             out: out.to_owned(),
-            about: about.clone(),
+            about,
+            made,
             shards: notes.iter().flatten().map(|note| note.count).max(),
             lock: FolderLock::take(out)?,
             _shared: shared,
@@ -89,7 +109,7 @@ impl Sources {
     /// Kind `Input` where two folders say different things of one item, or the results were made by code of other algorithm
     /// numbers than the plan; kind `Write`.
     pub fn merge(self, plan: &Plan) -> Result<Merged> {
-        let Self { folders, out, about, shards, lock, .. } = self;
+        let Self { folders, out, about, shards, lock, mut made, .. } = self;
         refuse_other_algorithms(plan, &about, &folders[0])?;
         let standings: Vec<Standing> =
             folders.iter().map(|folder| Standing::read(plan, folder)).collect::<Result<_>>()?;
@@ -99,7 +119,12 @@ impl Sources {
             superseded::settle(plan, &out, &Standing::read(plan, &out)?)?;
         }
         let images = carry_images(plan, &folders, &out, &rows)? + carry_references(plan, &folders, &out, &rows)?;
+        made.0 = None;
+        folder::remove_report(&out)?;
         folder::write_about(plan, &out, &about.command, about.source.as_ref())?;
+        if let Some(origin) = folders.iter().find_map(|folder| Origin::read(folder)) {
+            origin.write(&out)?;
+        }
         folder::write_note(&out, shards.map(|count| ShardNote { count }))?;
         write_in_plan_order(plan, &out, &rows, &timings)?;
         let status = Status::read(plan, &out)?;

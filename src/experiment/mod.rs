@@ -26,6 +26,7 @@ mod lines;
 mod machine;
 mod measure;
 pub mod merge;
+pub mod origin;
 mod pictures;
 pub mod plan;
 pub mod progress;

@@ -14,7 +14,7 @@ use super::backend::{estimator_word, stage_word};
 
 pub use super::growth::{Growth, is_enough};
 use super::identity::{ID_LENGTH, pixel_hash};
-use super::lines::{line, lines};
+use super::lines::{line, lines, sound_lines};
 use crate::error::{Error, Result};
 use crate::film::{Image, read_exr};
 use crate::stats::Estimate;
@@ -499,7 +499,7 @@ pub fn read(path: &Path) -> Result<Vec<Row>> {
 /// # Errors
 /// As [`read`].
 pub fn read_timings(path: &Path) -> Result<Vec<Timing>> {
-    Ok(lines(path, parse_timing)?.0)
+    Ok(sound_lines(path, parse_timing)?.values)
 }
 
 /// One line of `timings.jsonl`.

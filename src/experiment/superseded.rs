@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::folder;
 use super::lines::{line, write_if_changed, write_lines};
 use super::plan::Plan;
 use super::results::{self, Kind, Row, Timing};
@@ -40,7 +41,7 @@ enum Raw {
 /// The file's lines, each once.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Superseded {
-    lines: Vec<String>,
+    lines: Vec<Vec<u8>>,
 }
 
 impl Superseded {
@@ -50,8 +51,11 @@ impl Superseded {
     /// Kind `Input` where it is there and cannot be read.
     pub fn read(out: &Path) -> Result<Self> {
         let path = superseded_path(out);
-        match std::fs::read_to_string(&path) {
-            Ok(text) => Ok(Self { lines: text.lines().map(str::to_owned).collect() }),
+        match std::fs::read(&path) {
+            Ok(bytes) => {
+                let lines = bytes.split(|&byte| byte == b'\n').filter(|line| !line.is_empty());
+                Ok(Self { lines: lines.map(<[u8]>::to_vec).collect() })
+            }
             Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(Self::default()),
             Err(e) => Err(Error::input(path.display(), format!("expected rows that were put aside, found: {e}"))),
         }
@@ -59,7 +63,7 @@ impl Superseded {
 
     /// The rows among them, the last put aside first, each with its line's number.
     pub fn rows(&self) -> Vec<(usize, Row)> {
-        let row = |(number, text): (usize, &String)| match serde_json::from_str(text) {
+        let row = |(number, text): (usize, &Vec<u8>)| match serde_json::from_slice(text) {
             Ok(Raw::Row(value)) => Some((number, Row::parse(&value.to_string()).ok()?)),
             _ => None,
         };
@@ -68,7 +72,7 @@ impl Superseded {
 
     /// The timings among them, likewise.
     fn timings(&self) -> Vec<(usize, Timing)> {
-        let timing = |(number, text): (usize, &String)| match serde_json::from_str(text) {
+        let timing = |(number, text): (usize, &Vec<u8>)| match serde_json::from_slice(text) {
             Ok(Raw::Timing(timing)) => Some((number, timing)),
             _ => None,
         };
@@ -77,7 +81,7 @@ impl Superseded {
 
     /// Puts a line last.
     fn add(&mut self, new: &Line) {
-        let text = line(new);
+        let text = line(new).into_bytes();
         self.lines.retain(|old| *old != text);
         self.lines.push(text);
     }
@@ -91,7 +95,7 @@ impl Superseded {
                 _ => Ok(()),
             };
         }
-        write_if_changed(&path, (self.lines.join("\n") + "\n").as_bytes())
+        write_if_changed(&path, &[&self.lines.join(&b'\n')[..], b"\n"].concat())
     }
 }
 
@@ -107,6 +111,20 @@ pub fn put_aside<'r>(out: &Path, rows: impl Iterator<Item = &'r Row>) -> Result<
     let mut superseded = Superseded::read(out)?;
     rows.for_each(|row| superseded.add(&Line::Row(row)));
     superseded.write(out)
+}
+
+/// Takes out what was put aside of these items.
+///
+/// # Errors
+/// Kind `Input` where the file cannot be read, kind `Write`.
+pub fn forget(out: &Path, ids: &HashSet<&str>) -> Result<()> {
+    let mut aside = Superseded::read(out)?;
+    let rows = aside.rows().into_iter().filter(|(_, row)| ids.contains(row.id())).map(|(number, _)| number);
+    let timings = aside.timings().into_iter().filter(|(_, t)| ids.contains(t.id.as_str())).map(|(number, _)| number);
+    let gone: HashSet<usize> = rows.chain(timings).collect();
+    let mut number = 0..;
+    aside.lines.retain(|_| !number.next().is_some_and(|number| gone.contains(&number)));
+    aside.write(out)
 }
 
 /// What was put aside and what came back.
@@ -159,13 +177,14 @@ pub fn settle(plan: &Plan, out: &Path, standing: &Standing) -> Result<Settled> {
     if standing.is_clean && aside.is_empty() && old_timings.is_empty() && taken.is_empty() {
         return Ok(Settled::default());
     }
-    let stays: Vec<String> =
+    let stays: Vec<Vec<u8>> =
         put_aside.lines.iter().enumerate().filter(|(n, _)| !taken.contains(n)).map(|(_, text)| text.clone()).collect();
     let mut stays = Superseded { lines: stays };
     for list in [&mut put_aside, &mut stays] {
         aside.iter().for_each(|row| list.add(&Line::Row(row)));
         old_timings.iter().for_each(|timing| list.add(&Line::Timing(timing)));
     }
+    folder::remove_report(out)?;
     put_aside.write(out)?;
     write_lines(&results::results_path(out), rows.iter())?;
     write_lines(&results::timings_path(out), timings.into_iter())?;

@@ -7,8 +7,8 @@ use std::path::Path;
 
 use super::backend::Size;
 use super::images;
-use super::lines::lines_if_any;
-use super::plan::{Batch, Plan, Work, WorkItem};
+use super::lines::{Sound, lines_if_any, sound_lines};
+use super::plan::{Batch, Plan, ReferenceSource, Work, WorkItem};
 use super::results::{self, Kind, Row, Timing};
 use crate::error::{Error, Result};
 
@@ -60,6 +60,8 @@ pub struct Standing {
     pub timings: HashMap<String, Timing>,
     /// State of each of the plan's items.
     pub states: Vec<State>,
+    /// Places of lines of timings that do not read, and why: seconds are lost with them, no result.
+    pub(super) unsound_timings: Vec<String>,
     /// Whether both files are exactly their whole lines.
     pub(super) is_clean: bool,
 }
@@ -69,7 +71,14 @@ impl Standing {
     pub fn nothing(plan: &Plan) -> Self {
         let state = |item: &WorkItem| if item.batch().is_some() { State::Optional } else { State::Missing };
         let states = plan.items.iter().map(state).collect();
-        Self { rows: HashMap::new(), in_file: Vec::new(), timings: HashMap::new(), states, is_clean: true }
+        Self {
+            rows: HashMap::new(),
+            in_file: Vec::new(),
+            timings: HashMap::new(),
+            states,
+            unsound_timings: Vec::new(),
+            is_clean: true,
+        }
     }
 
     /// Reads an output folder; one that is not there has nothing done.
@@ -78,7 +87,8 @@ impl Standing {
     /// Kind `Input` where a line other than a torn last one does not read.
     pub fn read(plan: &Plan, out: &Path) -> Result<Self> {
         let (in_file, rows_clean) = lines_if_any(&results::results_path(out), Row::parse)?;
-        let (timings, timings_clean) = lines_if_any(&results::timings_path(out), results::parse_timing)?;
+        let Sound { values: timings, unsound: unsound_timings, is_clean: timings_clean } =
+            sound_lines(&results::timings_path(out), results::parse_timing)?;
         let rows: HashMap<String, Row> = in_file.iter().map(|row| (row.id().to_owned(), row.clone())).collect();
         let wanted = |batch: &Batch| batches(plan, &rows, &batch.reference_id).is_some_and(|n| batch.number < n);
         let state = |item: &WorkItem| match item.batch() {
@@ -87,7 +97,7 @@ impl Standing {
         };
         let states = plan.items.iter().map(state).collect();
         let timings = timings.into_iter().map(|timing| (timing.id.clone(), timing)).collect();
-        Ok(Self { rows, in_file, timings, states, is_clean: rows_clean && timings_clean })
+        Ok(Self { rows, in_file, timings, states, unsound_timings, is_clean: rows_clean && timings_clean })
     }
 }
 
@@ -120,11 +130,10 @@ pub(super) fn state(item: &WorkItem, row: Option<&Row>, out: &Path) -> State {
 /// Whether a row holds what the item would find: the id vouches for the pixels, the rest is compared here.
 pub(super) fn is_result_of(row: &Row, item: &WorkItem) -> bool {
     let metrics = item.metrics_algorithm;
-    match (row, &item.work) {
+    let is_measured_so = match (row, &item.work) {
         (Row::Image(row), Work::Image(work)) => {
             let errors = row.errors.as_ref();
-            row.kind == work.kind
-                && errors.map(|errors| &errors.reference_id) == work.reference_id.as_ref()
+            errors.map(|errors| &errors.reference_id) == work.reference_id.as_ref()
                 && row.twin.as_ref().map(|twin| &twin.id) == work.twin.as_ref()
                 && errors.is_none_or(|errors| errors.metrics_algorithm == metrics)
         }
@@ -132,7 +141,59 @@ pub(super) fn is_result_of(row: &Row, item: &WorkItem) -> bool {
         (Row::Ensemble(row), Work::Ensemble(_)) => row.metrics_algorithm == metrics,
         (Row::Points(row), Work::Points(_)) => row.metrics_algorithm == metrics,
         _ => false,
-    }
+    };
+    is_measured_so && altered(row, item).is_none()
+}
+
+/// The first field in which a row says something else of itself than the item, whose id it has, is: nobody wrote it so.
+pub(super) fn altered(row: &Row, item: &WorkItem) -> Option<&'static str> {
+    let fields: Vec<(&'static str, bool)> = match (row, &item.work) {
+        (Row::Image(row), Work::Image(work)) => vec![
+            ("kind", row.kind == work.kind),
+            ("scene", row.scene == work.scene),
+            ("sampler", row.sampler == work.sampler),
+            ("spp", row.spp == work.spp),
+            ("replicate", row.replicate == work.replicate),
+            ("batch", row.batch == work.batch.as_ref().map_or(0, |batch| batch.number)),
+            ("seed", row.seed == work.seed),
+            ("estimator", row.estimator == work.estimator),
+            ("stage", row.stage == work.stage),
+            ("variant", row.variant == work.variant),
+            ("size", row.size == work.size),
+        ],
+        (Row::Reference(row), Work::Reference(work)) => {
+            let (sampler, spp, halves) = match &work.source {
+                ReferenceSource::Exact => ("exact", None, None),
+                ReferenceSource::Halves { ids, sampler, spp, .. } => (sampler.as_str(), Some(*spp), Some(ids)),
+            };
+            vec![
+                ("scene", row.scene == work.scene),
+                ("size", row.size == work.size),
+                ("sampler", row.sampler == sampler),
+                ("spp", row.spp == spp),
+                ("halves", row.halves.as_ref() == halves),
+            ]
+        }
+        (Row::Ensemble(row), Work::Ensemble(work)) => vec![
+            ("scene", row.scene == work.scene),
+            ("sampler", row.sampler == work.sampler),
+            ("spp", row.spp == work.spp),
+            ("estimator", row.estimator == work.estimator),
+            ("variant", row.variant == work.variant),
+            ("size", row.size == work.size),
+            ("reference_id", row.reference_id == work.reference_id),
+            ("replicates", row.replicates as usize == work.members.len()),
+            ("members", row.members == work.members),
+        ],
+        (Row::Points(row), Work::Points(work)) => vec![
+            ("sampler", row.sampler == work.sampler),
+            ("n", row.n == work.n),
+            ("replicate", row.replicate == work.replicate),
+            ("seed", row.seed == work.seed),
+        ],
+        _ => vec![("kind", false)],
+    };
+    fields.into_iter().find(|(_, agrees)| !agrees).map(|(name, _)| name)
 }
 
 /// What a plan costs from where it stands.

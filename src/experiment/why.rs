@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::plan::{ReferenceSource, Work, WorkItem};
 use super::results::{MadeWith, Row, kind_name};
+use super::survey::altered;
 
 /// Something that a row was made with and that is another now.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -39,6 +40,8 @@ pub enum Reason {
     Changed(Vec<Change>),
     /// It is made of, or compared with, other items than its row was.
     Remade,
+    /// Its row says of a field something else than its id stands for.
+    Altered(&'static str),
     /// Its row was put aside and fits again.
     Aside,
     /// It was done by a version that did not write down with what.
@@ -54,6 +57,7 @@ impl Reason {
             Self::Changed(changes) if changes.iter().any(|change| change.scene.is_some()) => "scene changed",
             Self::Changed(_) => "algorithm changed",
             Self::Remade => "experiment changed",
+            Self::Altered(_) => "row altered",
             Self::Aside => "put aside",
             Self::Earlier => "stale",
         }
@@ -70,6 +74,7 @@ impl fmt::Display for Reason {
                 write!(f, "{}", changes.join("; "))
             }
             Self::Remade => write!(f, "made of or compared with other items now"),
+            Self::Altered(field) => write!(f, "the row says another {field} than its id stands for"),
             Self::Aside => write!(f, "fits again: the next run takes the row back from superseded.jsonl"),
             Self::Earlier => write!(f, "made by an earlier version, which did not say with what"),
         }
@@ -143,7 +148,11 @@ pub fn difference(row: &Row, item: &WorkItem) -> Reason {
     if let Some(from) = metrics_algorithm(row).filter(|&from| from != item.metrics_algorithm) {
         changes.push(change("metrics", Some(from), Some(item.metrics_algorithm)));
     }
-    if changes.is_empty() { Reason::Remade } else { Reason::Changed(changes) }
+    match altered(row, item).filter(|_| row.id() == item.id) {
+        Some(field) => Reason::Altered(field),
+        None if changes.is_empty() => Reason::Remade,
+        None => Reason::Changed(changes),
+    }
 }
 
 fn changes_between(was: &MadeWith, is: &MadeWith, scene: Option<&str>) -> Vec<Change> {
