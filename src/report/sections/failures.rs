@@ -4,14 +4,14 @@ use crate::stats::Estimate;
 
 use super::super::evidence::{Answer, Limit, below, clearly_above_one, interpolated, ratio_of_roots};
 use super::super::markdown::{Page, link_to};
-use super::super::numbers::{counted, estimate, listed, percent, short, signed_estimate};
+use super::super::numbers::{counted, estimate, percent, signed_estimate};
 use super::super::summarise::{Cell, Summary};
 use super::correlation::{Pattern, pattern_spp, patterns};
 use super::speed::efficiency;
 use super::words::{
-    bias_words, level, limit_words, name, ratio_cell, rmse_ratio, row, same_as_cell, scene_name, times,
+    bias_words, level, limit_words, marked_row, name, ratio_cell, rmse_ratio, same_as_cell, scene_name, times,
 };
-use super::{tabulate, titles};
+use super::{reference, tabulate, titles};
 
 /// An error at a count that is no power of two, over what its neighbours promise.
 pub struct OddCount {
@@ -79,7 +79,7 @@ fn course_failure(summary: &Summary, scene: usize, sampler: usize) -> Option<Vec
             name(summary, sampler),
             scene_name(summary, scene),
             format!("RMSE {to} / {from} spp = {}; {}", times(&course.rmse_ratio), bias_words(cell, mean)),
-            row(&cell.id),
+            marked_row(cell),
         ]
     })
 }
@@ -92,7 +92,7 @@ fn pattern_failure(summary: &Summary, scene: usize, pattern: &Pattern) -> Vec<St
         name(summary, pattern.sampler),
         scene_name(summary, scene),
         format!("ρ = {rho} at {} spp", pattern.cell.spp.asked),
-        row(&pattern.cell.id),
+        marked_row(pattern.cell),
     ]
 }
 
@@ -108,7 +108,7 @@ fn odd_failure(summary: &Summary, scene: usize, sampler: usize) -> Option<Vec<St
             odd.taken,
             times(&odd.ratio)
         ),
-        row(&cell.id),
+        marked_row(cell),
     ])
 }
 
@@ -187,7 +187,7 @@ fn right_image(summary: &Summary, scene: usize, sampler: usize, to: u32) -> Stri
         (Limit::Falls, Answer::Yes) => "its error falls, but it is biased",
         _ => "cannot tell",
     };
-    format!("{word} ({})", estimate(&cell.bias2))
+    format!("{word} ({}){}", estimate(&cell.bias2), reference::mark(cell))
 }
 
 fn against_uniform(summary: &Summary, scene: usize, sampler: usize, uniform: usize, spp: u32) -> String {
@@ -195,7 +195,8 @@ fn against_uniform(summary: &Summary, scene: usize, sampler: usize, uniform: usi
         return "1".to_owned();
     }
     let cells = summary.cell(scene, sampler, spp).zip(summary.cell(scene, uniform, spp));
-    ratio_cell(cells.and_then(|(own, base)| rmse_ratio(own, base)))
+    let mark = cells.map_or("", |(own, _)| reference::mark(own));
+    format!("{}{mark}", ratio_cell(cells.and_then(|(own, base)| rmse_ratio(own, base))))
 }
 
 /// What is one number a sampler: odd counts, randomness, neighbours, efficiency.
@@ -263,9 +264,7 @@ pub fn limits(summary: &Summary, page: &mut Page) {
     page.heading(2, titles::LIMITS);
     let e = &summary.about.experiment;
     let mut items = Vec::new();
-    for (i, scene) in summary.scenes.iter().enumerate() {
-        items.extend(reference_limit(summary, i, scene.reference_rmse()));
-    }
+    items.extend((0..summary.scenes.len()).filter_map(|scene| reference::limit(summary, scene)));
     items.push(match e.replicates {
         1 => "One replicate: no variance, and no interval that holds a sampler's own randomness.".to_owned(),
         n => format!(
@@ -293,31 +292,4 @@ pub fn limits(summary: &Summary, page: &mut Page) {
         counted(summary.scenes.len(), "scene", "scenes")
     ));
     page.bullets(&items);
-}
-
-/// How near the errors come to the reference's own.
-fn reference_limit(summary: &Summary, scene: usize, noise: Option<f64>) -> Option<String> {
-    let noise = noise?;
-    let at = scene_name(summary, scene);
-    if noise == 0.0 {
-        return Some(format!("{at}: the reference is exact."));
-    }
-    let cells = summary.cells.iter().filter(|cell| cell.scene == scene);
-    let least = cells.filter_map(|cell| cell.rmse.map(|rmse| (rmse.value, cell))).min_by(|a, b| a.0.total_cmp(&b.0));
-    let below: Vec<String> = summary
-        .cells
-        .iter()
-        .filter(|cell| cell.scene == scene && cell.rmse.is_none())
-        .map(|cell| format!("{} at {} spp", name(summary, cell.sampler), cell.spp.asked))
-        .collect();
-    let least = least.map(|(rmse, cell)| {
-        format!(
-            "; the smallest RMSE measured is {} ({} times it, row {})",
-            short(rmse),
-            short(rmse / noise),
-            row(&cell.id)
-        )
-    });
-    let below = if below.is_empty() { String::new() } else { format!("; below noise: {}", listed(&below)) };
-    Some(format!("{at}: the reference's own RMSE is {}{}{below}.", short(noise), least.unwrap_or_default()))
 }
