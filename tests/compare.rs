@@ -108,8 +108,32 @@ fn a_file_of_several_layers_is_read_by_name_or_refused_with_their_names() {
     let misspelt = refusal("layers.exr", Some("difuse"));
     assert!(["\"\", \"diffuse\"", "did you mean \"diffuse\"?"].iter().all(|p| misspelt.contains(p)), "{misspelt}");
     assert_eq!(read_picture(&data("layers.exr"), Some("")).unwrap().pixels, read("layers.exr").pixels);
-    // The only layer of a file is read whatever the others are called.
+    // One --layer is for images and references: a file with unnamed channels alone has nothing to mistake.
     assert_eq!(read_picture(&data("grey.exr"), Some("diffuse")).unwrap().pixels, read("grey.exr").pixels);
+}
+
+#[test]
+fn a_single_layer_is_read_under_its_own_name_alone() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let read_as = |layer: Option<&str>| read_picture(file.path(), layer);
+    let layers = std::fs::read(data("layers.exr")).unwrap();
+    // Without an R of its own, the unnamed layer is no image, and "diffuse" is the only one.
+    std::fs::write(file.path(), patched(layers.clone(), b"\x01\0\0\0R\0", b"\x01\0\0\0S\0")).unwrap();
+    let diffuse = read_picture(&data("layers.exr"), Some("diffuse")).unwrap();
+    assert_eq!(read_as(None).unwrap().pixels, diffuse.pixels);
+    assert_eq!(read_as(Some("diffuse")).unwrap().pixels, diffuse.pixels);
+    for wanted in ["difuse", "specular", ""] {
+        let error = read_as(Some(wanted)).unwrap_err();
+        let found = format!("expected one of the layers \"diffuse\", found \"{wanted}\"");
+        assert!(error.exit_code() == 2 && error.what.contains(&found), "{error}");
+    }
+    // The other way round: a layer that is there but has no colours is not the unnamed one.
+    std::fs::write(file.path(), patched(layers, b"diffuse.R\0", b"diffuse.S\0")).unwrap();
+    assert_eq!(read_as(Some("specular")).unwrap().pixels, read("layers.exr").pixels);
+    for wanted in ["diffuse", "N"] {
+        let error = read_as(Some(wanted)).unwrap_err();
+        assert!(error.what.contains(&format!("found \"{wanted}\"")), "{error}");
+    }
 }
 
 #[test]
@@ -247,6 +271,10 @@ fn a_pfm_is_read_as_it_was_written_and_its_faults_are_named() {
     for (bytes, part) in [
         (b"PF\n3 two\n-1\n".as_slice(), "expected a height in its header, found \"two\""),
         (b"PF\n3 2\n0\n", "a scale other than 0"),
+        (b"PF\n3 2\n-1e160\n", "that a 32-bit number holds in its header, found \"-1e160\""),
+        (b"PF\n3 2\n1e-160\n", "that a 32-bit number holds in its header, found \"1e-160\""),
+        (b"PF\n3 2\nNaN\n", "a scale other than 0"),
+        (b"Pf\n1 1\n3e38\n\x40\0\0\0", "expected values of at most 3.40"),
         (b"PF\n3 2\n-1\n1234", "expected 72 bytes for 3×2 pixels after the header, found 4"),
         (b"Pf\n1 1\n-1\n12345", "expected 4 bytes for 1×1 pixels after the header, found 5"),
         (b"PF\n3", "expected a PFM header with"),
@@ -257,13 +285,53 @@ fn a_pfm_is_read_as_it_was_written_and_its_faults_are_named() {
     }
 }
 
+/// The largest values that a file may hold are still far from where squares of errors, or of those, leave f64.
+#[test]
+fn the_largest_values_have_finite_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, value) in
+        [("a.pfm", f32::MAX), ("b.pfm", 0.5 * f32::MAX), ("c.pfm", 0.25 * f32::MAX), ("r.pfm", f32::MIN)]
+    {
+        write_pfm(&folder.path().join(name), &Image { width: 2, height: 2, pixels: vec![[value; 3]; 4] }).unwrap();
+    }
+    let found =
+        compare(folder.path(), &["a.pfm", "b.pfm", "c.pfm", "--replicates", "--reference", "r.pfm", "--json"]).json();
+    for metric in ["mse", "rmse", "rel_mse", "mae", "smape", "bias", "max_abs", "mse_trimmed", "bias2", "variance"] {
+        let value = &found["replicates"][metric];
+        assert!(value["value"].is_f64() && value["ci95"][0].is_f64() && value["ci95"][1].is_f64(), "{metric} {value}");
+    }
+}
+
+/// `gamma16.png` with another `gAMA` and its checksum, computed by Python's zlib.
+#[test]
+fn a_png_of_a_gamma_without_meaning_is_refused() {
+    let whole = std::fs::read(data("gamma16.png")).unwrap();
+    let at = whole.windows(4).position(|name| name == b"gAMA").unwrap() + 4;
+    for (gamma, sum) in GAMMA_SUMS {
+        let mut bytes = whole.clone();
+        bytes[at..at + 4].copy_from_slice(&gamma.to_be_bytes());
+        bytes[at + 4..at + 8].copy_from_slice(&sum.to_be_bytes());
+        let error = read_bytes(&bytes).unwrap_err();
+        let what = format!("expected a gAMA of 1000 to 10000000 (in 1/100000), found {gamma}");
+        assert!(error.exit_code() == 2 && error.what.contains(&what), "{error}");
+    }
+}
+
+/// Values of `gAMA` and the CRC-32 of their chunks.
+const GAMMA_SUMS: [(u32, u32); 3] = [(0, 0x8b25_604d), (1, 0xfc22_50db), (u32::MAX, 0x559e_40ae)];
+
 /// An image of 4 × 4 pixels of `value` as EXR that says it is of `seed` and `spp`.
 fn rendered(folder: &TempDir, name: &str, value: f32, seed: u64, spp: u32) -> PathBuf {
+    rendered_by(folder, name, value, "ld:best", seed, spp)
+}
+
+/// The same of any sampler.
+fn rendered_by(folder: &TempDir, name: &str, value: f32, sampler: &str, seed: u64, spp: u32) -> PathBuf {
     let path = folder.path().join(name);
     let image = Image { width: 4, height: 4, pixels: vec![[value; 3]; 16] };
     let says = [
         ("scene", "configs/a01.json".to_owned()),
-        ("sampler", "ld:best".to_owned()),
+        ("sampler", sampler.to_owned()),
         ("seed", seed.to_string()),
         ("spp", spp.to_string()),
         ("stage", "final".to_owned()),
@@ -322,6 +390,14 @@ fn an_image_that_shares_its_reference_s_random_numbers_is_refused() {
     let here = folder.path();
     compare(here, &[short, "--reference", long]).refused(&["share random numbers", "seed 1", "scene a01", "--seed"]);
     compare(here, &[short, "--reference", other]).ends(0, &[]);
+    // Numbers are drawn by decision and seed, so another sampler draws the same; as many samples or not.
+    for spp in [16, 1024] {
+        let halton = rendered_by(&folder, "halton.exr", 0.5, "halton:best", 1, spp);
+        let halton = halton.to_str().unwrap();
+        compare(here, &[halton, "--reference", short]).refused(&["share random numbers", "whatever the samplers"]);
+        compare(here, &[other, "--reference", short, "--reference2", halton]).refused(&["independent of"]);
+        compare(here, &[halton, "--reference", other]).ends(0, &[]);
+    }
     compare(here, &[short, "--reference", other, "--reference2", long]).refused(&["share random numbers"]);
     compare(here, &[other, "--reference", short, "--reference2", again]).refused(&["no second"]);
     compare(here, &[other, "--reference", short, "--reference2", long]).refused(&["independent of", "no second"]);
@@ -379,7 +455,31 @@ fn replicates_are_judged_together_with_intervals() {
     let copy = folder.path().join("copy.pfm");
     std::fs::copy(&replicates[0], &copy).unwrap();
     let equal = [copy.to_str().unwrap(), &replicates[0], "--replicates", "--reference", &reference];
-    compare(folder.path(), &equal).ends(0, &["not an independent replicate"]);
+    compare(folder.path(), &equal).refused(&["independent of the others", "equal to", "in every pixel", "--seed"]);
+    let own = [copy.to_str().unwrap(), &replicates[1], "--replicates", "--reference", &replicates[0]];
+    compare(folder.path(), &own).refused(&["copy.pfm", "equal to the reference in every pixel"]);
+}
+
+#[test]
+fn replicates_that_share_random_numbers_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let reference = rendered(&folder, "reference.exr", 0.625, 9, 1024);
+    let first = rendered(&folder, "first.exr", 0.5, 1, 16);
+    let second = rendered(&folder, "second.exr", 0.75, 2, 16);
+    let again = rendered(&folder, "again.exr", 0.875, 1, 16);
+    let halton = rendered_by(&folder, "halton.exr", 0.25, "halton:best", 1, 16);
+    let own = rendered(&folder, "own.exr", 0.25, 9, 1024);
+    let all = [&reference, &first, &second, &again, &halton, &own].map(|path| path.to_str().unwrap());
+    let [reference, first, second, again, halton, own] = all;
+    let run = |images: &[&str]| {
+        compare(folder.path(), &[images, &["--replicates", "--reference", reference, "--diff", "d.exr"]].concat())
+    };
+    // Another version's render of the same numbers is no replicate either, though one image alone may be compared with it.
+    run(&[first, second, again]).refused(&["again.exr: ", "the same render as ", "first.exr", "--seed"]);
+    run(&[first, second, halton]).refused(&["halton.exr: ", "shares random numbers with ", "scene a01 and seed 1"]);
+    run(&[first, own]).refused(&["own.exr: ", "the same render as the reference"]);
+    assert!(!folder.path().join("d.exr").exists());
+    run(&[first, second]).ends(0, &[]);
 }
 
 #[test]

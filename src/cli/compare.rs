@@ -27,7 +27,7 @@ pub struct Compare {
     /// The images are independent replicates of one estimator: errors of that, with 95 % intervals
     #[arg(long)]
     replicates: bool,
-    /// Layer to read from files that have several (names as in the file: "diffuse" for diffuse.R)
+    /// Layer to read (names as in the file: "diffuse" for diffuse.R); a file's only layer without a name is read all the same
     #[arg(long, value_name = "NAME")]
     layer: Option<String>,
     /// Write image − reference: linear .exr or .pfm, or .png in red (brighter) and blue (darker)
@@ -66,14 +66,18 @@ impl Compare {
         for path in &self.images {
             let file = path.display().to_string();
             let image = self.read(path)?;
-            self.note(path, &reference.check(&file, &image)?);
+            let notes = reference.check(&file, &image)?;
+            if self.replicates {
+                let others = found.images.iter().map(|other| other.file.as_str()).zip(&kept);
+                reference.check_replicate(&file, &image, others)?;
+            }
+            self.note(path, &notes);
             found.images.push(ImageErrors { file, nonfinite: 0, errors: reference.errors(&image) });
             if self.replicates || diff.is_some() {
                 kept.push(image);
             }
         }
         if self.replicates {
-            self.note_equal(&kept);
             let errors: Vec<_> = found.images.iter().map(|image| image.errors.clone()).collect();
             found.replicates = Some(ReplicatesErrors { count: kept.len(), errors: reference.ensemble(&kept, &errors) });
         }
@@ -137,16 +141,6 @@ impl Compare {
         if !self.quiet {
             for note in notes {
                 say(format_args!("note: {}: {note}", path.display()));
-            }
-        }
-    }
-
-    /// Replicates that are equal in every bit are no evidence of how they spread.
-    fn note_equal(&self, images: &[Picture]) {
-        for (i, image) in images.iter().enumerate().skip(1) {
-            if let Some(other) = images[..i].iter().position(|other| other.pixels == image.pixels) {
-                let other = self.images[other].display();
-                self.note(&self.images[i], &[format!("equal to {other} in every pixel: not an independent replicate")]);
             }
         }
     }

@@ -172,7 +172,7 @@ impl Reference {
     /// Refuses an image that cannot be compared, and says what should be known of one that can.
     ///
     /// # Errors
-    /// Kind `Input` where `image` differs in size, or shares its random numbers with a reference of more samples.
+    /// Kind `Input` where `image` differs in size, or shares its random numbers with a reference but is not the same render.
     pub fn check(&self, name: &str, image: &Picture) -> Result<Vec<String>> {
         check_size(image, name, &self.first)?;
         let mut notes = Vec::new();
@@ -187,7 +187,7 @@ impl Reference {
                 Some(kinship::Kinship::SharedNumbers(shared)) => {
                     let what = format!(
                         "expected an image independent of the reference, found one of the same {shared}: they share random \
-                         numbers, which hides error; render one of them with another --seed"
+                         numbers, whatever the samplers, which hides error; render one of them with another --seed"
                     );
                     return Err(Error::input(name, what));
                 }
@@ -202,6 +202,33 @@ impl Reference {
             }
         }
         Ok(notes)
+    }
+
+    /// Refuses a replicate that is not independent of the reference or of one of the `others` named: their spread, and the
+    /// intervals made of it, would be too small.
+    ///
+    /// # Errors
+    /// Kind `Input` where `image` equals one of them in every pixel, or says that it is of the same scene and seed.
+    pub fn check_replicate<'a>(
+        &'a self,
+        name: &str,
+        image: &Picture,
+        others: impl IntoIterator<Item = (&'a str, &'a Picture)>,
+    ) -> Result<()> {
+        let references = self.given().map(|reference| ("the reference", reference));
+        for (other_name, other) in references.chain(others) {
+            let found = match kinship(image, other) {
+                Some(kinship::Kinship::SharedNumbers(shared)) => {
+                    format!("one that shares random numbers with {other_name}, being of the same {shared}")
+                }
+                Some(kinship::Kinship::SameRender) => format!("the same render as {other_name}"),
+                None if image.pixels == other.pixels => format!("one equal to {other_name} in every pixel"),
+                None => continue,
+            };
+            let what = format!("expected a replicate independent of the others and of the reference, found {found}");
+            return Err(Error::input(name, format!("{what}; render each with a --seed of its own")));
+        }
+        Ok(())
     }
 
     /// Errors of one image, without intervals: what one image would say of another is not in it.

@@ -100,7 +100,7 @@ struct Layer {
     choice: Choice,
 }
 
-/// Picks the image: the only one there is, the one named, or the unnamed R G B.
+/// Picks the image: the one named, or the unnamed R G B, or without a name the only one there is.
 fn choose(about: &About, headers: &[Header], wanted: Option<&str>) -> Result<Choice> {
     let mut layers: Vec<Layer> = headers.iter().enumerate().flat_map(|(i, h)| layers_of(i, h, headers.len())).collect();
     let names: Vec<String> = layers.iter().map(|layer| layer.name.clone()).collect();
@@ -111,7 +111,9 @@ fn choose(about: &About, headers: &[Header], wanted: Option<&str>) -> Result<Cho
             let all = all.collect::<Vec<_>>().join(", ");
             return Err(about.bad(format!("expected channels R, G, B or Y, found {all}")));
         }
-        (1, _) => Some(0),
+        (1, None) => Some(0),
+        // One --layer is for images and references, of which some may have nothing but R G B.
+        (1, Some(wanted)) if names[0].is_empty() && !has_layer(headers, wanted) => Some(0),
         (_, Some(wanted)) => match names.iter().position(|name| name == wanted) {
             None => {
                 let near = did_you_mean(wanted, names.iter().map(String::as_str));
@@ -131,6 +133,12 @@ fn choose(about: &About, headers: &[Header], wanted: Option<&str>) -> Result<Cho
             Err(about.bad(format!("expected --layer to name one of its layers, found none named and {}", quoted())))
         }
     }
+}
+
+/// Whether any channel, of colour or not, is of this layer.
+fn has_layer(headers: &[Header], wanted: &str) -> bool {
+    let layer_of = |c: &ChannelDescription| c.name.to_string().rsplit_once('.').map(|(layer, _)| layer.to_owned());
+    headers.iter().flat_map(|h| &h.channels.list).any(|c| layer_of(c).as_deref() == Some(wanted))
 }
 
 /// The layers of a part that have R, G and B, or else luminance alone.

@@ -38,11 +38,24 @@ pub(super) fn read(mut reader: impl BufRead, about: &About) -> Result<Picture> {
             *pixel = if header.channels == 3 { [next(), next(), next()] } else { [next(); 3] };
         }
     }
+    check_range(&pixels, header.factor, about)?;
     let notes = match header.factor {
         1.0 => Vec::new(),
         factor => vec![format!("PFM: all values are multiplied by the scale {factor} of its header")],
     };
     Ok(Picture { width, height, pixels, corner: None, provenance: Vec::new(), notes })
+}
+
+/// Refuses a scale that makes finite samples too large for 32 bits: their squares, and what is computed of those, would leave `f64`.
+fn check_range(pixels: &[[f64; 3]], factor: f64, about: &About) -> Result<()> {
+    let largest = f64::from(f32::MAX);
+    match pixels.as_flattened().iter().find(|c| c.is_finite() && c.abs() > largest) {
+        Some(value) => {
+            let what = format!("expected values of at most {largest:e}, found {value:e} after its scale {factor:e}");
+            Err(about.bad(what))
+        }
+        None => Ok(()),
+    }
 }
 
 /// The text before the pixels.
@@ -51,7 +64,7 @@ struct Header {
     width: u64,
     height: u64,
     is_little_endian: bool,
-    /// Above 0.
+    /// Above 0, a normal number of 32 bits when rounded.
     factor: f64,
     /// Length of the header.
     bytes: u64,
@@ -86,9 +99,11 @@ impl Header {
         };
         let (width, height) = (side("a width")?, side("a height")?);
         let text = word("a scale")?;
-        let scale = text.parse::<f64>().ok().filter(|scale| scale.is_finite() && *scale != 0.0);
-        let scale =
-            scale.ok_or_else(|| about.bad(format!("expected a scale other than 0 in its header, found \"{text}\"")))?;
+        let scale = text.parse::<f64>().ok().filter(|scale| (*scale as f32).is_normal());
+        let scale = scale.ok_or_else(|| {
+            let what = "expected a scale other than 0 that a 32-bit number holds in its header";
+            about.bad(format!("{what}, found \"{text}\""))
+        })?;
         Ok(Self { channels, width, height, is_little_endian: scale < 0.0, factor: scale.abs(), bytes })
     }
 }

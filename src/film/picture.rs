@@ -48,9 +48,9 @@ impl Picture {
 ///
 /// - *OpenEXR*: half, float and unsigned channels `R G B`, of a layer `layer.R layer.G layer.B` too, or luminance `Y` alone
 ///   (taken for all three); scan lines or tiles, of several resolutions the largest; every compression but HTJ2K and
-///   ZSTD; data windows anywhere. Not deep data, not subsampled channels. `layer` names the one to read in a file that has several; without it
+///   ZSTD; data windows anywhere. Not deep data, not subsampled channels. `layer` names the one to read, where the only one has a name too; without it
 ///   the unnamed `R G B` are read, and a file where that is not one is refused with their names.
-/// - *PFM*: `PF` and `Pf` (grey), either byte order; values are multiplied by the scale's magnitude.
+/// - *PFM*: `PF` and `Pf` (grey), either byte order; values are multiplied by the scale's magnitude and have to stay within what `f32` holds.
 /// - *PNG*: 8 and 16 bits a channel (fewer are widened), grey, colour or palette, decoded from sRGB (IEC 61966-2-1) to linear, or by the
 ///   file's `gAMA` where that is another curve; alpha and colour profiles are not applied. Notes say so.
 ///

@@ -1,6 +1,7 @@
 //! PNG files as linear values: what a screen would show, for want of radiance.
 
 use std::io::{BufRead, Seek, SeekFrom};
+use std::ops::RangeInclusive;
 
 use image::codecs::png::PngDecoder;
 use image::{ColorType, ImageDecoder, Limits};
@@ -10,6 +11,10 @@ use crate::error::Result;
 
 /// The `gAMA` that stands for the sRGB curve: 1/2.2 in the format's unit of 1/100000.
 const SRGB_GAMMA: u32 = 45_455;
+
+/// Values of `gAMA` that stand for a curve, exponents of 1/100 to 100: the format has no meaning for 0, and beyond these nearly
+/// every code value would be black or white.
+const GAMMAS: RangeInclusive<u32> = 1_000..=10_000_000;
 
 /// Longest chunk before the pixels, 16 MiB: profiles and texts are far shorter.
 const LONGEST_CHUNK: u32 = 1 << 24;
@@ -29,7 +34,7 @@ pub(super) fn read(mut reader: impl BufRead + Seek, about: &About) -> Result<Pic
     decoder.read_image(&mut bytes).map_err(bad)?;
 
     let bits = 8 * usize::from(kind.bytes_per_pixel() / kind.channel_count());
-    let curve = space.curve();
+    let curve = space.curve(about)?;
     let linear: Vec<f64> = (0..1_u32 << bits).map(|code| curve.decode(code, bits)).collect();
     let (pixels, is_opaque) = if bits == 8 {
         colours(&bytes, kind, &linear)
@@ -95,13 +100,15 @@ impl ColourSpace {
         }
     }
 
-    /// How values are decoded; the decoder refuses a `gAMA` of 0.
-    fn curve(&self) -> Curve {
-        match self.gamma {
-            Some(gamma) if !self.is_srgb && !self.has_profile && gamma.abs_diff(SRGB_GAMMA) > 10 => {
-                Curve::Power(100_000.0 / f64::from(gamma.max(1)))
+    /// How values are decoded.
+    fn curve(&self, about: &About) -> Result<Curve> {
+        match self.gamma.filter(|_| !self.is_srgb && !self.has_profile) {
+            Some(gamma) if !GAMMAS.contains(&gamma) => {
+                let [least, most] = [GAMMAS.start(), GAMMAS.end()];
+                Err(about.bad(format!("expected a gAMA of {least} to {most} (in 1/100000), found {gamma}")))
             }
-            _ => Curve::Srgb,
+            Some(gamma) if gamma.abs_diff(SRGB_GAMMA) > 10 => Ok(Curve::Power(100_000.0 / f64::from(gamma))),
+            _ => Ok(Curve::Srgb),
         }
     }
 }
