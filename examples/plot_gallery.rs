@@ -35,7 +35,7 @@ fn curve(name: &str, index: usize, scale: f64) -> Series {
     let datum = |(j, &spp): (usize, &f64)| {
         let y = scale * (libm::pow(spp, slope) * (1.0 + 0.03 * wobble(index, j)) + wall);
         let half = 0.12 * y;
-        Datum { x: spp, y, interval: Some((y - half, y + half)) }
+        Datum { x: spp, y, interval: Some((y - half, y + half)), is_pale: false }
     };
     Series::of_sampler(name, SPP.iter().enumerate().map(datum).collect())
 }
@@ -75,9 +75,12 @@ fn convergence(folder: &Path) -> Result<()> {
 }
 
 fn edges(folder: &Path) -> Result<()> {
-    let datum = |x, y| Datum { x, y, interval: None };
+    let datum = |x, y| Datum { x, y, interval: None, is_pale: false };
     let frame = frame("Edge cases", "n (points)", "star discrepancy D* (no unit)");
-    let one = Series::of_sampler("sobol:best", vec![Datum { x: 64.0, y: 0.02, interval: Some((0.018, 0.022)) }]);
+    let one = Series::of_sampler(
+        "sobol:best",
+        vec![Datum { x: 64.0, y: 0.02, interval: Some((0.018, 0.022)), is_pale: false }],
+    );
     let long = Series::of_sampler(
         "halton:joint:digits@each with a very long name that goes on",
         (0..16).map(|i| datum(libm::exp2(f64::from(i)), libm::pow(10.0, 3.0 - f64::from(i)))).collect(),

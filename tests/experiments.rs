@@ -908,7 +908,10 @@ fn any_shards_in_any_order_merge_to_the_same_bytes_and_a_lacking_one_is_named() 
         // Images of replicates stay where they were made: nothing shows them.
         assert!(found.iter().all(|(name, bytes)| expected.get(name) == Some(bytes)), "{count}");
         let shown = plan.items.iter().filter(|item| item.is_shown && item.kept_image().is_some()).count();
-        assert_eq!(found.keys().filter(|name| name.ends_with(".exr")).count(), shown);
+        assert_eq!(
+            found.keys().filter(|name| name.ends_with(".exr") && !name.starts_with("reference-")).count(),
+            shown
+        );
         assert_eq!(run(&plan, &toy, &out).done, 0);
     }
 }

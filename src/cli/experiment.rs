@@ -144,9 +144,11 @@ fn survey_json(survey: &Survey) -> serde_json::Value {
         "items": kinds.collect::<Vec<_>>(),
         "samples": survey.samples,
         "samples_left": survey.samples_left,
+        "samples_growth_at_most": survey.samples_growth,
         "samples_per_second": survey.rate,
         "rate_is_measured": survey.is_rate_measured,
         "seconds_left": survey.seconds_left,
+        "seconds_growth_at_most": survey.seconds_growth,
         "memory_bytes": survey.memory_bytes,
         "disk_bytes": survey.disk_bytes,
     })

@@ -4,6 +4,9 @@
 //! `results.jsonl`; a finished image is on disk before its row is. When the last item is done the rows are written
 //! once more, in plan order and in one piece, so the bytes do not depend on how often the run was interrupted.
 
+mod grow;
+mod halves;
+
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
@@ -28,9 +31,10 @@ use super::results::{
 use super::shards::Shard;
 use super::status::stale_rows;
 use super::superseded::{self, Settled};
-use super::survey::{Limits, Standing, State, Survey};
+use super::survey::{self, Limits, Standing, State, Survey};
 use crate::error::{Error, ErrorKind, Result};
-use crate::film::Image;
+use crate::film::{Image, write_exr};
+use grow::Growing;
 
 /// How to run.
 pub struct Options<'a> {
@@ -75,7 +79,7 @@ pub struct Failure {
 /// What a run did.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// Items of the plan, or of the part of it that was to be done.
+    /// Items of the plan, or of the part of it that was to be done, without the batches that no reference wants.
     pub items: usize,
     /// Items that were done before.
     pub found: usize,
@@ -162,19 +166,23 @@ pub fn execute_locked(
     let found = standing.states[part.clone()].iter().filter(|&&state| state == State::Done).count();
     let is_else_done = |run: &Run| {
         let mut others = (0..plan.items.len()).filter(|position| !part.contains(position));
-        others.all(|position| run.states[position] == State::Done)
+        others.all(|position| matches!(run.states[position], State::Done | State::Optional))
     };
-    let meter = Meter::new(found, part.len(), survey.samples_left);
+    let wanted = standing.states[part.clone()].iter().filter(|&&state| state != State::Optional).count();
+    let meter = Meter::new(found, wanted, survey.samples_left);
     let mut run = Run::new(plan, backend, out, progress, options, standing, meter)?;
     let (done, interrupted) = run.all_items(&part)?;
     if !interrupted {
+        run.keep_references()?;
         run.write_in_plan_order()?;
-        if found + done == part.len() && is_else_done(&run) {
+        let tick = run.meter.tick();
+        if tick.items_done == tick.items && is_else_done(&run) {
             folder::write_note(out, None)?;
         }
     }
-    let samples = run.meter.tick().samples_done;
-    Ok((Outcome { items: part.len(), found, done, failures: run.failures, interrupted, samples }, lock))
+    let tick = run.meter.tick();
+    let (items, found, samples) = (tick.items, tick.items_done - done, tick.samples_done);
+    Ok((Outcome { items, found, done, failures: run.failures, interrupted, samples }, lock))
 }
 
 /// What the folder holds of the plan, after what no longer belongs to it was put aside, and what does again is back.
@@ -224,6 +232,8 @@ struct Run<'a> {
     images: Images,
     /// The reference at hand: items of one reference stand together.
     reference: Option<(String, Arc<ReferenceImages>)>,
+    /// The reference that grows at the moment.
+    growing: Option<Growing>,
     rows: HashMap<String, Row>,
     timings: HashMap<String, Timing>,
     states: Vec<State>,
@@ -257,6 +267,7 @@ impl<'a> Run<'a> {
             host: machine::describe(),
             images: Images::new(out),
             reference: None,
+            growing: None,
             rows,
             timings,
             states,
@@ -273,12 +284,16 @@ impl<'a> Run<'a> {
         let released = self.plan.released_after();
         let mut done = 0;
         for (position, released) in released.iter().enumerate() {
-            if part.contains(&position) && self.states[position] != State::Done {
+            if part.contains(&position) && self.may_be_wanted(position) {
                 let told = self.options.stop.is_some_and(|stop| stop.load(Ordering::Relaxed));
                 if told || self.options.at_most == Some(done) {
                     return Ok((done, true));
                 }
-                match self.one_item(position) {
+                let step = match self.is_wanted(position) {
+                    Ok(true) => self.one_item(position),
+                    other => other,
+                };
+                match step {
                     Ok(is_done) => done += usize::from(is_done),
                     Err(error) if error.kind == ErrorKind::Interrupted => return Ok((done, true)),
                     Err(error) => return Err(error),
@@ -356,6 +371,7 @@ impl<'a> Run<'a> {
             names: self.names(&work.sampler),
             spp: work.spp,
             replicate: work.replicate,
+            batch: work.batch.as_ref().map_or(0, |batch| batch.number),
             seed: work.seed,
             estimator: work.estimator,
             stage: work.stage,
@@ -370,10 +386,19 @@ impl<'a> Run<'a> {
     }
 
     fn reference_row(&mut self, item: &WorkItem, work: &ReferenceWork) -> Result<ReferenceRow> {
-        let reference = self.reference(&item.id)?;
+        let (reference, noise_mse, growth) = match self.plan.growth(&item.id) {
+            Some(_) => {
+                let grown = self.grown(&item.id)?;
+                (grown.images, grown.noise_mse, Some(grown.growth))
+            }
+            None => {
+                let reference = self.reference(&item.id)?;
+                (reference.clone(), reference.noise_mse(), None)
+            }
+        };
         let (sampler, spp, halves) = match &work.source {
             ReferenceSource::Exact => ("exact".to_owned(), None, None),
-            ReferenceSource::Halves { ids, sampler, spp } => (sampler.clone(), Some(*spp), Some(ids.clone())),
+            ReferenceSource::Halves { ids, sampler, spp, .. } => (sampler.clone(), Some(*spp), Some(ids.clone())),
         };
         Ok(ReferenceRow {
             schema: SCHEMA,
@@ -385,8 +410,9 @@ impl<'a> Run<'a> {
             size: work.size,
             focal_depth: self.backend.focal_depth(&work.scene, work.size),
             halves,
+            growth,
             metrics_algorithm: item.metrics_algorithm,
-            noise_mse: reference.noise_mse(),
+            noise_mse,
             mean: reference.mean_value(),
             pixels: reference.pixels(),
             made_with: None,
@@ -447,8 +473,13 @@ impl<'a> Run<'a> {
         {
             return Ok(images.clone());
         }
-        let [a, b] = self.plan.reference_images(id);
-        let images = Arc::new(ReferenceImages::new([self.image(a)?, self.image(b)?]));
+        let images = match self.plan.growth(id) {
+            Some(_) => self.grown_images(id)?,
+            None => {
+                let [a, b] = self.plan.reference_images(id);
+                Arc::new(ReferenceImages::new([self.image(a)?, self.image(b)?]))
+            }
+        };
         self.reference = Some((id.to_owned(), images.clone()));
         Ok(images)
     }
@@ -585,8 +616,11 @@ pub(super) fn write_in_plan_order(
     rows: &HashMap<String, Row>,
     timings: &HashMap<String, Timing>,
 ) -> Result<()> {
-    let rows: Vec<Row> =
-        plan.items.iter().filter_map(|item| Some(plan.as_written(item, rows.get(&item.id)?.clone()))).collect();
+    let (unwanted, items): (Vec<&WorkItem>, Vec<&WorkItem>) =
+        plan.items.iter().partition(|item| survey::is_unwanted(plan, rows, item));
+    superseded::put_aside(out, unwanted.into_iter().filter_map(|item| rows.get(&item.id)))?;
+    let row = |item: &WorkItem| Some(plan.as_written(item, rows.get(&item.id)?.clone()));
+    let rows: Vec<Row> = items.into_iter().filter_map(row).collect();
     write_lines(&results::results_path(out), rows.iter())?;
     write_lines(&results::timings_path(out), plan.items.iter().filter_map(|item| timings.get(&item.id)))
 }

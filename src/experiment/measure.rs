@@ -33,6 +33,12 @@ impl ReferenceImages {
         image_error::reference_noise(a, b)
     }
 
+    /// Mean square error of an image, free of the reference's noise on average.
+    pub fn mse_of(&self, image: &Image) -> f64 {
+        let [a, b] = self.flat();
+        image_error::mse_unbiased(image.pixels.as_flattened(), a, b)
+    }
+
     /// Mean over all pixel-channels.
     pub fn mean_value(&self) -> f64 {
         mean_value(&self.mean)

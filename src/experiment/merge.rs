@@ -9,8 +9,8 @@ use serde_json::Value;
 use super::execute::write_in_plan_order;
 use super::folder::{self, FolderLock, ShardNote};
 use super::images::stored;
-use super::plan::Plan;
-use super::results::{self, About, Row, SceneFacts, Timing};
+use super::plan::{Plan, Work};
+use super::results::{self, About, Row, SceneFacts, Timing, read_image_at};
 use super::status::Status;
 use super::superseded;
 use super::survey::{Standing, is_result_of};
@@ -98,7 +98,7 @@ impl Sources {
         if folders.contains(&out) {
             superseded::settle(plan, &out, &Standing::read(plan, &out)?)?;
         }
-        let images = carry_images(plan, &folders, &out, &rows)?;
+        let images = carry_images(plan, &folders, &out, &rows)? + carry_references(plan, &folders, &out, &rows)?;
         folder::write_about(plan, &out, &about.command, about.source.as_ref())?;
         folder::write_note(&out, shards.map(|count| ShardNote { count }))?;
         write_in_plan_order(plan, &out, &rows, &timings)?;
@@ -210,6 +210,28 @@ fn union_of_timings(plan: &Plan, standings: &[Standing]) -> HashMap<String, Timi
     timings
 }
 
+/// Copies, whole, the references as images of their own ([`results::reference_path`]).
+fn carry_references(plan: &Plan, folders: &[PathBuf], out: &Path, rows: &HashMap<String, Row>) -> Result<usize> {
+    let mut copied = 0;
+    for item in plan.items.iter().filter(|item| rows.contains_key(&item.id)) {
+        let Work::Reference(work) = &item.work else { continue };
+        for part in work.source.parts() {
+            let path = |folder: &Path| results::reference_path(folder, &work.scene, item.is_shown, part);
+            let is_in = |folder: &Path| read_image_at(&path(folder), &item.id, None).is_ok();
+            if let Some(folder) = folders.iter().find(|folder| is_in(folder)).filter(|_| !is_in(out)) {
+                copy_whole(&path(folder), &path(out))?;
+                copied += 1;
+            }
+        }
+    }
+    Ok(copied)
+}
+
+fn copy_whole(from: &Path, to: &Path) -> Result<()> {
+    let bytes = std::fs::read(from).map_err(|e| Error::input(from.display(), format!("cannot read: {e}")))?;
+    write_whole(to, &bytes)
+}
+
 /// Copies, whole, the images that a report shows from wherever they prove to be the ones that were written.
 fn carry_images(plan: &Plan, folders: &[PathBuf], out: &Path, rows: &HashMap<String, Row>) -> Result<usize> {
     let mut copied = 0;
@@ -220,9 +242,7 @@ fn carry_images(plan: &Plan, folders: &[PathBuf], out: &Path, rows: &HashMap<Str
             continue;
         }
         let Some(folder) = folders.iter().find(|folder| is_in(folder)) else { continue };
-        let path = results::image_path(folder, &item.id);
-        let bytes = std::fs::read(&path).map_err(|e| Error::input(path.display(), format!("cannot read: {e}")))?;
-        write_whole(&results::image_path(out, &item.id), &bytes)?;
+        copy_whole(&results::image_path(folder, &item.id), &results::image_path(out, &item.id))?;
         copied += 1;
     }
     Ok(copied)

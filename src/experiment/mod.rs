@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | read a file | [`spec`] | strict, pure data |
 //! | list the work | [`plan`] | pure: ids and seeds come from content |
+//! | let a reference grow | [`growth`] | pure: the rule and its reasons |
 //! | say what is left and what it costs | [`survey`] | reads the output folder |
 //! | do it | [`execute`] | the only slow stage; can be stopped at any moment, or cut into [`shards`] |
 //! | rows | [`results`] | typed lines of `results.jsonl` |
@@ -17,6 +18,7 @@ mod entry;
 mod exact;
 pub mod execute;
 pub mod folder;
+pub mod growth;
 pub mod identity;
 mod images;
 pub mod lab;

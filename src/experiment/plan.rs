@@ -5,6 +5,7 @@
 //! sampler, the spp and the replicate. No list position goes into either, so adding a sampler, a scene, an spp or a
 //! replicate leaves every existing image as it is.
 
+mod references;
 mod variants;
 
 use std::collections::{HashMap, HashSet};
@@ -16,6 +17,15 @@ use super::results::{Count, Kind, LeftOut, MadeWith, Row, short_hash};
 use super::spec::{Experiment, Pictures};
 use crate::error::{Error, Result, did_you_mean};
 use variants::{is_seeded_as_its_twin, probed_samplers};
+
+/// Which of a growing half's batches an image is, beyond the first; done only where the reference turns out to want it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Batch {
+    /// Number of the batch, from 1.
+    pub number: u32,
+    /// Id of the reference that decides.
+    pub reference_id: String,
+}
 
 /// One image to render.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,6 +40,8 @@ pub struct ImageWork {
     pub spp: Count,
     /// Replicate, or half of a reference.
     pub replicate: u32,
+    /// For what a reference may grow by.
+    pub batch: Option<Batch>,
     /// Seed of the randomisation.
     pub seed: u64,
     /// Image size.
@@ -58,15 +70,36 @@ impl ImageWork {
 pub enum ReferenceSource {
     /// A closed form; the image is kept under the reference's own id.
     Exact,
-    /// Two independent images.
+    /// Two independent images, or means of independent batches of them.
     Halves {
-        /// Their ids.
+        /// Their ids, or those of their first batches.
         ids: [String; 2],
         /// Their sampler in canonical form.
         sampler: String,
-        /// Samples per pixel of each.
+        /// Samples per pixel of each half, or of each batch.
         spp: Count,
+        /// What they may grow by.
+        growth: Option<GrowthWork>,
     },
+}
+
+impl ReferenceSource {
+    /// Names of the images that a reference is to be had as.
+    pub fn parts(&self) -> &'static [&'static str] {
+        match self {
+            Self::Exact => &["exact"],
+            Self::Halves { .. } => &["A", "B"],
+        }
+    }
+}
+
+/// What a reference may grow by, and what decides how far.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GrowthWork {
+    /// Ids of all batches of each half, the first among them, a power of two of them.
+    pub batches: [Vec<String>; 2],
+    /// Ids of the images whose errors the reference has to judge.
+    pub pilots: Vec<String>,
 }
 
 /// One reference.
@@ -183,6 +216,14 @@ impl WorkItem {
         }
     }
 
+    /// For an item that is done only where a growing reference wants it: which batch of which reference it is.
+    pub fn batch(&self) -> Option<&Batch> {
+        match &self.work {
+            Work::Image(work) => work.batch.as_ref(),
+            _ => None,
+        }
+    }
+
     /// Pairs of points to look at: the metrics take a time that grows with n².
     pub fn pairs(&self) -> u64 {
         match &self.work {
@@ -205,7 +246,10 @@ impl WorkItem {
         match &self.work {
             Work::Image(work) => {
                 let what = match work.kind {
-                    Kind::ReferenceHalf => format!("reference half {}", work.replicate),
+                    Kind::ReferenceHalf => match &work.batch {
+                        None => format!("reference half {}", work.replicate),
+                        Some(batch) => format!("reference half {} batch {}", work.replicate, batch.number),
+                    },
                     Kind::Picture => "picture".to_owned(),
                     Kind::Stage => format!("stage {}", work.stage.name()),
                     _ => format!("replicate {}", work.replicate),
@@ -287,7 +331,16 @@ impl Plan {
         row
     }
 
-    /// Ids of the images that a reference is made of: two halves, or the closed form twice.
+    /// What a reference may grow by; `None` where it does not grow.
+    pub fn growth(&self, reference_id: &str) -> Option<&GrowthWork> {
+        match &self.items[self.position(reference_id)?].work {
+            Work::Reference(ReferenceWork { source: ReferenceSource::Halves { growth, .. }, .. }) => growth.as_ref(),
+            _ => None,
+        }
+    }
+
+    /// Ids of the images that a reference is made of at the least: two halves (of one that grows, their first batches), or
+    /// the closed form twice.
     ///
     /// # Panics
     /// Where the plan has no such reference.
@@ -300,15 +353,19 @@ impl Plan {
         }
     }
 
-    /// Ids of the images that an item needs, its own among them.
+    /// Ids of the images that an item needs, its own among them. Of a reference that grows these are its first batches;
+    /// the further ones are items of their own ([`WorkItem::batch`]), and how many are needed turns out on the way.
     pub fn images_needed(&self, position: usize) -> Vec<&str> {
         let item = &self.items[position];
+        let pilots = |id: &str| self.growth(id).into_iter().flat_map(|growth| growth.pilots.iter().map(String::as_str));
         match &item.work {
             Work::Points(_) => Vec::new(),
-            Work::Reference(_) => self.reference_images(&item.id).to_vec(),
+            Work::Reference(_) => self.reference_images(&item.id).into_iter().chain(pilots(&item.id)).collect(),
             Work::Image(work) => {
-                let reference = work.reference_id.iter().flat_map(|id| self.reference_images(id));
-                reference.chain(work.twin.as_deref()).chain([item.id.as_str()]).collect()
+                let decides = work.batch.as_ref().map(|batch| &batch.reference_id);
+                let reference = work.reference_id.iter().chain(decides).flat_map(|id| self.reference_images(id));
+                let pilots = decides.into_iter().flat_map(|id| pilots(id));
+                reference.chain(pilots).chain(work.twin.as_deref()).chain([item.id.as_str()]).collect()
             }
             Work::Ensemble(work) => {
                 let reference = self.reference_images(&work.reference_id);
@@ -611,12 +668,32 @@ impl Planner<'_> {
     /// followed by what is held against it.
     fn add_statistics(&mut self, scene: &SceneFacts, size: Size, samplers: &[PlannedSampler], probed: &[String]) {
         self.note_scene(scene, samplers);
-        let reference_id = self.add_reference(scene, size, self.experiment.reference.spp, "reference");
+        let reference_id = self.add_grown_reference(scene, size, samplers, probed);
         for sampler in self.done_in(scene, samplers) {
             self.add_shortcut_of(scene, size, sampler, &reference_id);
             if probed.contains(&sampler.canonical) {
                 self.add_stability_of(scene, size, sampler, &reference_id);
             }
+        }
+    }
+
+    /// One replicate made one way, compared with nothing yet.
+    fn render_work(&self, scene: &SceneFacts, size: Size, sampler: &str, making: Making, replicate: u32) -> ImageWork {
+        let Making { asked, estimator, variant } = making;
+        ImageWork {
+            kind: Kind::Render,
+            scene: scene.name.clone(),
+            sampler: sampler.to_owned(),
+            spp: self.count_of(sampler, scene, asked, variant),
+            replicate,
+            batch: None,
+            seed: self.seed("render", &scene.name, sampler, asked, replicate),
+            size,
+            estimator,
+            stage: Stage::Final,
+            variant,
+            reference_id: None,
+            twin: None,
         }
     }
 
@@ -637,18 +714,9 @@ impl Planner<'_> {
         let members: Vec<String> = (0..self.replicates(sampler, Some(scene), self.experiment.replicates))
             .map(|replicate| {
                 let work = ImageWork {
-                    kind: Kind::Render,
-                    scene: scene.name.clone(),
-                    sampler: sampler.clone(),
-                    spp,
-                    replicate,
-                    seed: self.seed("render", &scene.name, sampler, asked, replicate),
-                    size,
-                    estimator,
-                    stage: Stage::Final,
-                    variant,
                     reference_id: Some(reference_id.to_owned()),
                     twin: twins.get(replicate as usize).cloned(),
+                    ..self.render_work(scene, size, sampler, making, replicate)
                 };
                 self.add_image(scene, work)
             })
@@ -679,46 +747,6 @@ impl Planner<'_> {
         Count { asked, taken: passes.map(|pass| self.count(sampler, Some(scene), pass).taken).sum() }
     }
 
-    /// A reference and, where the scene has no closed form, its two halves; the reference's id.
-    fn add_reference(&mut self, scene: &SceneFacts, size: Size, asked: u32, purpose: &str) -> String {
-        let sampler = self.reference.canonical.clone();
-        let numbers = self.backend.algorithms(&sampler);
-        let (id, source) = if scene.exact_reference {
-            let id = Fingerprint::new("exact reference")
-                .with("scene", &scene.content_hash)
-                .with("size", size)
-                .with("exact algorithm", numbers.exact)
-                .id();
-            (id, ReferenceSource::Exact)
-        } else {
-            let spp = self.count(&sampler, Some(scene), asked);
-            let ids = [0, 1].map(|half| self.add_half(scene, size, spp, half, purpose));
-            let id = Fingerprint::new("reference").with("halves", ids.join(",")).id();
-            (id, ReferenceSource::Halves { ids, sampler, spp })
-        };
-        self.push(id, numbers.metrics, Work::Reference(ReferenceWork { scene: scene.name.clone(), size, source }))
-    }
-
-    /// One half of a reference. It stands for the truth, so it never takes the sheet's shortcut.
-    fn add_half(&mut self, scene: &SceneFacts, size: Size, spp: Count, half: u32, purpose: &str) -> String {
-        let sampler = self.reference.canonical.clone();
-        let work = ImageWork {
-            kind: Kind::ReferenceHalf,
-            scene: scene.name.clone(),
-            spp,
-            replicate: half,
-            seed: self.seed(purpose, &scene.name, &sampler, spp.asked, half),
-            sampler,
-            size,
-            estimator: Estimator::Unbiased,
-            stage: Stage::Final,
-            variant: Variant::Plain,
-            reference_id: None,
-            twin: None,
-        };
-        self.add_image(scene, work)
-    }
-
     /// The pictures: a reference of their own, one image of each sampler and count, and the stages of the sheet's Figure 1.
     fn add_pictures(&mut self, scene: &SceneFacts, pictures: &Pictures, samplers: &[PlannedSampler]) {
         self.is_shown = true;
@@ -731,6 +759,7 @@ impl Planner<'_> {
                 sampler: sampler.canonical.clone(),
                 spp: self.count(&sampler.canonical, Some(scene), asked),
                 replicate: 0,
+                batch: None,
                 seed: self.seed("picture", &scene.name, &sampler.canonical, asked, 0),
                 size: pictures.size,
                 estimator: self.experiment.estimator.primary(),
@@ -758,6 +787,7 @@ impl Planner<'_> {
             scene: scene.name.clone(),
             spp: self.count(&sampler, Some(scene), asked),
             replicate: 0,
+            batch: None,
             seed: self.seed(&purpose, &scene.name, &sampler, asked, 0),
             sampler,
             size,
@@ -770,10 +800,16 @@ impl Planner<'_> {
         self.add_image(scene, work);
     }
 
-    /// One image; its id hashes what the pixels depend on, so a row may be measured anew against another reference
-    /// without rendering again.
+    /// Adds one image; its id.
     fn add_image(&mut self, scene: &SceneFacts, work: ImageWork) -> String {
-        let Algorithms { renderer, sampler, estimator, metrics, .. } = self.backend.algorithms(&work.sampler);
+        let metrics = self.backend.algorithms(&work.sampler).metrics;
+        self.push(self.image_id(scene, &work), metrics, Work::Image(work))
+    }
+
+    /// An image's id hashes what the pixels depend on, so a row may be measured anew against another reference without
+    /// rendering again.
+    fn image_id(&self, scene: &SceneFacts, work: &ImageWork) -> String {
+        let Algorithms { renderer, sampler, estimator, .. } = self.backend.algorithms(&work.sampler);
         let fingerprint = Fingerprint::new("image")
             .with("scene", &scene.content_hash)
             .with("sampler", &work.sampler)
@@ -788,11 +824,10 @@ impl Planner<'_> {
             .with("sampler algorithm", sampler)
             .with("estimator algorithm", estimator);
         // What everybody makes is not told apart from what was made before there were variants.
-        let id = match work.variant {
+        match work.variant {
             Variant::Plain => fingerprint.id(),
             variant => fingerprint.with("variant", variant).id(),
-        };
-        self.push(id, metrics, Work::Image(work))
+        }
     }
 
     /// The seed of an item.

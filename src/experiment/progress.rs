@@ -58,6 +58,11 @@ impl Meter {
         self.items_done += 1;
     }
 
+    /// An item turned out to be wanted: a reference grows.
+    pub fn expect_item(&mut self) {
+        self.items += 1;
+    }
+
     /// An image was rendered. An image that had to be made anew was not foreseen.
     pub fn add_samples(&mut self, samples: u64) {
         self.samples_done += samples;

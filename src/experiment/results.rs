@@ -12,6 +12,7 @@ pub use super::about::{About, LeftOut, Source, about_path, read_about};
 pub use super::backend::{Estimator, PointMetrics, SceneFacts, Size, Stage, Variant};
 use super::backend::{estimator_word, stage_word};
 
+pub use super::growth::{Growth, is_enough};
 use super::identity::{ID_LENGTH, pixel_hash};
 use super::lines::{line, lines};
 use crate::error::{Error, Result};
@@ -36,14 +37,25 @@ pub fn image_path(out: &Path, id: &str) -> PathBuf {
     out.join("images").join(format!("{id}.exr"))
 }
 
+/// Where a reference is to be had as images, for `compare` and other programs: its two halves, `A` and `B`, or the one
+/// `exact` image of a closed form. Written at the end of a run, where what they are made of is on disk.
+pub fn reference_path(out: &Path, scene: &str, is_picture: bool, part: &str) -> PathBuf {
+    let picture = if is_picture { "-picture" } else { "" };
+    out.join("images").join(format!("reference-{scene}{picture}-{part}.exr"))
+}
+
 /// The image of an item, which proves to be the one that was written: right id, and the digest of its pixels is the one
 /// written with it and, where `pixels` is known from a row, that one.
 ///
 /// # Errors
 /// Kind `Input` where the file is missing, torn, or not what was written.
 pub fn read_image(out: &Path, id: &str, pixels: Option<&str>) -> Result<Image> {
-    let path = image_path(out, id);
-    let (image, provenance) = read_exr(&path)?;
+    read_image_at(&image_path(out, id), id, pixels)
+}
+
+/// As [`read_image`], of an image that has a name of its own.
+pub(super) fn read_image_at(path: &Path, id: &str, pixels: Option<&str>) -> Result<Image> {
+    let (image, provenance) = read_exr(path)?;
     let says = |name: &str| provenance.iter().find(|(n, _)| n == name).map_or("", |(_, value)| value.as_str());
     let found = pixel_hash(&image.pixels);
     for (what, expected, found) in [
@@ -185,6 +197,9 @@ pub struct ImageRow {
     pub spp: Count,
     /// Replicate, from 0; for a reference half its number, 0 or 1.
     pub replicate: u32,
+    /// For a reference that grew: number of the batch, from 0; not written where it is 0.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub batch: u32,
     /// Seed of the randomisation.
     #[serde(serialize_with = "decimal", deserialize_with = "from_decimal")]
     pub seed: u64,
@@ -227,17 +242,21 @@ pub struct ReferenceRow {
     pub scene: String,
     /// Sampler in canonical form, or `exact` for a closed form.
     pub sampler: String,
-    /// Samples per pixel of each half; null for a closed form.
+    /// Samples per pixel of each half, or of each batch where it grew; null for a closed form.
     pub spp: Option<Count>,
     /// Image size.
     pub size: Size,
     /// Distance of the plane of focus in images of this scene and size, scene units; null for a pinhole.
     pub focal_depth: Option<f64>,
-    /// Ids of the two halves; null for a closed form.
+    /// Ids of the two halves, or of their first batches where they grew; null for a closed form.
     pub halves: Option<[String; 2]>,
+    /// How far it grew; not written where it was not to grow.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub growth: Option<Growth>,
     /// Algorithm number of the metrics.
     pub metrics_algorithm: u32,
-    /// Mean square error of the mean of the halves, mean((R1 − R2)²)/4; 0 for a closed form.
+    /// Mean square error of the mean of the halves, mean((R1 − R2)²)/4, of one that grows from the spread among all its
+    /// batches ([`growth`](super::growth)); 0 for a closed form.
     pub noise_mse: f64,
     /// Mean over all pixel-channels.
     pub mean: f64,
@@ -488,6 +507,10 @@ pub(super) fn parse_timing(line: &str) -> std::result::Result<Timing, String> {
     serde_json::from_str(line).map_err(|e| format!("expected a timing, found: {e}"))
 }
 
+fn is_zero(n: &u32) -> bool {
+    *n == 0
+}
+
 /// Seeds as decimal texts.
 fn decimal<S: Serializer>(seed: &u64, serializer: S) -> std::result::Result<S::Ok, S::Error> {
     serializer.collect_str(seed)
@@ -513,6 +536,7 @@ mod tests {
             names: vec!["ld:best".to_owned()],
             spp: Count { asked: 26, taken: 28 },
             replicate: 3,
+            batch: 0,
             seed,
             estimator: Estimator::Unbiased,
             stage: Stage::Final,

@@ -81,12 +81,16 @@ pub fn blocks(plan: &Plan, count: u32) -> Vec<Range<usize>> {
 /// Cost in pairs of points. Writing and measuring count too, so that a plan of small images is spread.
 fn item_cost(plan: &Plan, position: usize) -> u128 {
     let item = &plan.items[position];
+    // Nobody knows before how many batches a reference wants; it may be none.
+    if item.batch().is_some() {
+        return 1000;
+    }
     let pixels = item.kept_image().map_or(0, |size| size.pixels());
     u128::from(item.samples() + pixels) * u128::from(PAIRS_A_SAMPLE) + u128::from(item.pairs()) + 1000
 }
 
 /// What belongs together: images and, behind them, the item that is made of them – an ensemble with its replicates, a
-/// reference with its halves. Everything else stands alone.
+/// reference with its halves and all that these may grow by. Everything else stands alone.
 fn groups(plan: &Plan) -> Vec<Range<usize>> {
     let mut starts: Vec<usize> = Vec::new();
     for position in 0..plan.items.len() {
@@ -110,7 +114,10 @@ fn parts(plan: &Plan, position: usize) -> Vec<&str> {
     let item = &plan.items[position];
     match &item.work {
         Work::Ensemble(work) => work.members.iter().map(String::as_str).collect(),
-        Work::Reference(_) => plan.reference_images(&item.id).to_vec(),
+        Work::Reference(_) => match plan.growth(&item.id) {
+            Some(growth) => growth.batches.iter().flatten().map(String::as_str).collect(),
+            None => plan.reference_images(&item.id).to_vec(),
+        },
         Work::Image(_) | Work::Points(_) => Vec::new(),
     }
 }

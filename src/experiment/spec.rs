@@ -12,7 +12,7 @@
 //! | `samplers` | texts `POINTS[:ORDER[:RANDOM[@SCOPE]]]` or `POINTS:PRESET`, or objects `{"points", "order", "random", "scope"}`; a bare name means `:best`; a sampler for each decision: `{"name", "sampler", "pixel", "lens", "light_pick", "light"}`, where `sampler` is what the decisions not named read (without it all four are needed) and `name` is what reports call it |
 //! | `spp` | samples per pixel, each 1 to 2^24 |
 //! | `replicates` | independent randomisations of each image; 1 is used where nothing is random |
-//! | `reference` | `{"sampler", "spp"}`: two independent halves of `spp` samples per pixel, by a randomised sampler that is not compared |
+//! | `reference` | `{"sampler", "spp"}`: two independent halves of `spp` samples per pixel, by a randomised sampler that is not compared; optional `"noise"` and `"most_spp"`: grow it ([`growth`](super::growth)) |
 //! | `estimator` | optional: `"unbiased"` (the default), `"sheet"`, or `"both"`: unbiased, and where a light is picked among several by the sheet's shortcut too; references are always unbiased |
 //! | `points` | optional: `{"n", "metrics", "replicates"}`: point-set metrics of the same samplers |
 //! | `pictures` | optional: `{"scene", "size", "spp", "reference_spp"}`, or a list of these: images to look at; `spp` is a count or a ladder of counts, `reference_spp` defaults to the reference's |
@@ -39,6 +39,12 @@ pub const MOST_POINTS: u32 = 1 << 16;
 
 /// Most replicates.
 pub const MOST_REPLICATES: u32 = 10_000;
+
+/// Most batches that a half of a reference may grow to.
+pub const MOST_BATCHES: u32 = 1024;
+
+/// `reference.most_spp` in multiples of `reference.spp`, where it is not given.
+pub const DEFAULT_BATCHES: u32 = 16;
 
 /// An experiment, all defaults made explicit.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -95,12 +101,30 @@ impl Sizes {
 }
 
 /// What images are compared with: two independent halves.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Reference {
     /// Sampler, as written; randomised, and none of those compared.
     pub sampler: String,
-    /// Samples per pixel of each half.
+    /// Samples per pixel of each half, or of each of its batches where it grows.
     pub spp: u32,
+    /// Grow until the reference's own RMSE is at most this share of the smallest RMSE it has to judge, above 0 and at
+    /// most 1; `None`: it does not grow.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<f64>,
+    /// Most samples per pixel of each half, at least `spp`; there where `noise` is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub most_spp: Option<u32>,
+}
+
+// `noise` is read as a number between 0 and 1, so it equals itself.
+impl Eq for Reference {}
+
+impl Reference {
+    /// Most batches of a half: the largest power of two whose samples fit into `most_spp`; 1 where it does not grow.
+    pub fn most_batches(&self) -> u32 {
+        let fit = self.noise.and(self.most_spp).map_or(1, |most| (most / self.spp).max(1));
+        1 << fit.ilog2()
+    }
 }
 
 /// Point-set metrics to compute.
@@ -329,8 +353,20 @@ fn reference(item: &Item) -> Result<Reference> {
     let mut fields = item.fields()?;
     let sampler = fields.need("sampler", |item| item.text("a sampler").map(str::to_owned))?;
     let spp = fields.need("spp", |item| count(&item, MOST_SPP))?;
+    let noise = fields.opt("noise", |item| item.f64("a share above 0 and at most 1", |x| x > 0.0 && x <= 1.0))?;
+    let most_spp = fields.opt("most_spp", |asked| match noise {
+        Some(_) => most_spp(&asked, spp),
+        None => Err(asked.unexpected("\"noise\" where \"most_spp\" is given: without it a reference does not grow")),
+    })?;
     fields.finish()?;
-    Ok(Reference { sampler, spp })
+    let most_spp = noise.map(|_| most_spp.unwrap_or_else(|| spp.saturating_mul(DEFAULT_BATCHES)));
+    Ok(Reference { sampler, spp, noise, most_spp })
+}
+
+/// `reference.most_spp`: as much as one batch, and no more batches than a plan can list.
+fn most_spp(item: &Item, spp: u32) -> Result<u32> {
+    let most = u64::from(spp) * u64::from(MOST_BATCHES);
+    item.integer(u64::from(spp)..=most.min(u64::from(u32::MAX))).map(|n| n as u32)
 }
 
 /// `points`.
@@ -406,17 +442,33 @@ mod tests {
     #[test]
     fn what_is_recorded_of_an_experiment_reads_back_equal() {
         let more = SMALL.replacen('{', "{\"stability\": {\"spp\": 64}, \"estimator\": \"both\",", 1);
-        for text in [SMALL, &more] {
+        let grown = SMALL.replace("\"spp\": 64}", "\"spp\": 64, \"noise\": 0.2}");
+        for text in [SMALL, &more, &grown] {
             let experiment = Experiment { place: String::new(), ..read(text).unwrap() };
             let recorded = serde_json::to_string(&experiment).unwrap();
             assert_eq!(serde_json::from_str::<Experiment>(&recorded).unwrap(), experiment);
             // What is not asked for is not recorded: older records read, and stay as they are.
             assert_eq!(recorded.contains("stability"), text.contains("stability"));
+            assert_eq!(recorded.contains("noise"), text.contains("noise"));
+        }
+    }
+
+    #[test]
+    fn a_reference_grows_by_powers_of_two_within_its_most_spp() {
+        let most = |more: &str| {
+            let text = SMALL.replace("\"spp\": 64}", &format!("\"spp\": 64{more}}}"));
+            read(&text).unwrap().reference.most_batches()
+        };
+        assert_eq!(most(""), 1);
+        assert_eq!(most(", \"noise\": 0.2"), DEFAULT_BATCHES);
+        let cases = [(64, 1), (127, 1), (128, 2), (700, 8), (65536, MOST_BATCHES)];
+        for (spp, batches) in cases {
+            assert_eq!(most(&format!(", \"noise\": 1, \"most_spp\": {spp}")), batches, "{spp}");
         }
     }
 
     /// Each edit of a good file, and what the message has to say of it.
-    const BAD: [(&str, &str, &str); 36] = [
+    const BAD: [(&str, &str, &str); 41] = [
         ("\"seed\"", "\"sede\"", "expected the key \"seed\""),
         ("\"points\"", "\"pionts\"", "pionts: expected one of the keys"),
         ("\"points\"", "\"pionts\"", "did you mean \"points\"?"),
@@ -461,6 +513,15 @@ mod tests {
             "\"seed\": ",
             "\"estimator\": \"sheat\", \"seed\": ",
             "estimator: expected \"unbiased\" or \"sheet\" or \"both\", found",
+        ),
+        ("\"spp\": 64}", "\"spp\": 64, \"noise\": 0}", "reference.noise: expected a share above 0 and at most 1"),
+        ("\"spp\": 64}", "\"spp\": 64, \"noise\": 1.5}", "reference.noise: expected a share above 0 and at most 1"),
+        ("\"spp\": 64}", "\"spp\": 64, \"nois\": 0.5}", "did you mean \"noise\"?"),
+        ("\"spp\": 64}", "\"spp\": 64, \"most_spp\": 128}", "reference.most_spp: expected \"noise\" where"),
+        (
+            "\"spp\": 64}",
+            "\"spp\": 64, \"noise\": 0.2, \"most_spp\": 63}",
+            "reference.most_spp: expected a whole number from 64 to 65536, found 63",
         ),
         (
             "\"scene\": \"pots\"",

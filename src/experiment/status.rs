@@ -27,7 +27,7 @@ pub struct Missing {
 /// What a folder holds of its experiment.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Status {
-    /// Items of the plan.
+    /// Items of the plan, without the batches that no reference is known to want.
     pub items: usize,
     /// Those that are done.
     pub done: usize,
@@ -53,9 +53,10 @@ impl Status {
         let is_stale = |row: &&Row| !plan.position(row.id()).is_some_and(|at| is_result_of(row, &plan.items[at]));
         let stale: Vec<Row> = standing.in_file.iter().filter(is_stale).cloned().collect();
         let done = standing.states.iter().filter(|&&state| state == State::Done).count();
-        let shards = read_note(out)?.map(|note| note.count).filter(|_| done < plan.items.len());
+        let items = standing.states.iter().filter(|&&state| state != State::Optional).count();
+        let shards = read_note(out)?.map(|note| note.count).filter(|_| done < items);
         Ok(Self {
-            items: plan.items.len(),
+            items,
             done,
             missing: missing(plan, &standing, superseded.iter().map(|(_, row)| row)),
             stale: stale_rows(plan, &stale),
@@ -135,7 +136,7 @@ fn missing<'a>(plan: &Plan, standing: &'a Standing, superseded: impl Iterator<It
     let mut missing: Vec<Missing> = Vec::new();
     for (item, state) in plan.items.iter().zip(&standing.states) {
         let reason = match state {
-            State::Done => continue,
+            State::Done | State::Optional => continue,
             State::ImageMissing => Reason::ImageLost,
             _ if aside.get(item.id.as_str()).is_some_and(|row| is_result_of(row, item)) => Reason::Aside,
             State::Missing => match standing.rows.get(&item.id).or_else(|| before.get(&slot_of_item(item)).copied()) {
@@ -154,6 +155,7 @@ fn missing<'a>(plan: &Plan, standing: &'a Standing, superseded: impl Iterator<It
 /// The shards that own something missing.
 fn missing_shards(plan: &Plan, standing: &Standing, count: u32) -> Vec<Shard> {
     let blocks = blocks(plan, count).into_iter().zip(1..);
-    let lacks = |block: &std::ops::Range<usize>| standing.states[block.clone()].iter().any(|&s| s != State::Done);
+    let is_to_do = |state: &State| !matches!(state, State::Done | State::Optional);
+    let lacks = |block: &std::ops::Range<usize>| standing.states[block.clone()].iter().any(is_to_do);
     blocks.filter(|(block, _)| lacks(block)).map(|(_, index)| Shard { index, count }).collect()
 }

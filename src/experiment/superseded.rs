@@ -4,7 +4,7 @@
 //! `superseded.jsonl`, out of every report's sight, and come back when the change is undone. Its lines are
 //! `{"row": …}` and `{"timing": …}`; a line that this version cannot read is kept as it is.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use super::lines::{line, write_if_changed, write_lines};
 use super::plan::Plan;
-use super::results::{self, Row, Timing};
-use super::survey::{Standing, is_result_of};
+use super::results::{self, Kind, Row, Timing};
+use super::survey::{Standing, is_result_of, is_unwanted};
 use crate::error::{Error, Result};
 
 /// Where they are.
@@ -95,6 +95,20 @@ impl Superseded {
     }
 }
 
+/// Puts rows aside that the folder's own file is about to do without.
+///
+/// # Errors
+/// As [`settle`].
+pub fn put_aside<'r>(out: &Path, rows: impl Iterator<Item = &'r Row>) -> Result<()> {
+    let mut rows = rows.peekable();
+    if rows.peek().is_none() {
+        return Ok(());
+    }
+    let mut superseded = Superseded::read(out)?;
+    rows.for_each(|row| superseded.add(&Line::Row(row)));
+    superseded.write(out)
+}
+
 /// What was put aside and what came back.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Settled {
@@ -112,11 +126,19 @@ pub struct Settled {
 /// # Errors
 /// Kind `Input` where rows put aside cannot be read, kind `Write`.
 pub fn settle(plan: &Plan, out: &Path, standing: &Standing) -> Result<Settled> {
-    let fits = |row: &Row| plan.position(row.id()).is_some_and(|at| is_result_of(row, &plan.items[at]));
+    let mut put_aside = Superseded::read(out)?;
+    let is_result = |row: &Row| plan.position(row.id()).is_some_and(|at| is_result_of(row, &plan.items[at]));
+    // How far references grew, by their rows here and aside: a batch beyond that belongs to the plan and not to its results.
+    let aside_rows: Vec<Row> = put_aside.rows().into_iter().map(|(_, row)| row).collect();
+    let references = aside_rows.iter().chain(&standing.in_file).filter(|row| row.kind() == Kind::Reference);
+    let references: HashMap<String, Row> =
+        references.filter(|row| is_result(row)).map(|row| (row.id().to_owned(), row.clone())).collect();
+    let is_unwanted =
+        |row: &Row| plan.position(row.id()).is_some_and(|at| is_unwanted(plan, &references, &plan.items[at]));
+    let fits = |row: &Row| is_result(row) && !is_unwanted(row);
     let (mut rows, aside): (Vec<Row>, Vec<Row>) = standing.in_file.iter().cloned().partition(fits);
     let (mut timings, old_timings): (Vec<&Timing>, Vec<&Timing>) =
         sorted(standing).into_iter().partition(|timing| plan.position(&timing.id).is_some());
-    let mut put_aside = Superseded::read(out)?;
     let mut ids: HashSet<String> = rows.iter().map(|row| row.id().to_owned()).collect();
     let mut taken: HashSet<usize> = HashSet::new();
     for (number, row) in put_aside.rows() {

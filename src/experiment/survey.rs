@@ -8,7 +8,7 @@ use std::path::Path;
 use super::backend::Size;
 use super::images;
 use super::lines::lines_if_any;
-use super::plan::{Plan, Work, WorkItem};
+use super::plan::{Batch, Plan, Work, WorkItem};
 use super::results::{self, Kind, Row, Timing};
 use crate::error::{Error, Result};
 
@@ -30,6 +30,9 @@ const BYTES_A_PIXEL: u64 = 12;
 /// Bytes of work beside the images held: f64 sums of a film and of an ensemble.
 const WORK_BYTES_A_PIXEL: u64 = 64;
 
+/// The same while a reference grows: f64 sums of two halves, mean and spread of all batches, and the halves as images.
+const GROWTH_BYTES_A_PIXEL: u64 = 4 * 24 + 3 * 12;
+
 /// Bytes on disk beside the pixels: header of an EXR, lines of rows and timings.
 const BYTES_AN_ITEM: u64 = 3 << 10;
 
@@ -42,6 +45,8 @@ pub enum State {
     ImageMissing,
     /// No row, or one that was measured another way.
     Missing,
+    /// A further batch of a reference that grows, which that reference does not want, or is not yet known to.
+    Optional,
 }
 
 /// What an output folder holds of a plan.
@@ -62,7 +67,8 @@ pub struct Standing {
 impl Standing {
     /// Nothing done, whatever a folder holds.
     pub fn nothing(plan: &Plan) -> Self {
-        let states = vec![State::Missing; plan.items.len()];
+        let state = |item: &WorkItem| if item.batch().is_some() { State::Optional } else { State::Missing };
+        let states = plan.items.iter().map(state).collect();
         Self { rows: HashMap::new(), in_file: Vec::new(), timings: HashMap::new(), states, is_clean: true }
     }
 
@@ -74,14 +80,34 @@ impl Standing {
         let (in_file, rows_clean) = lines_if_any(&results::results_path(out), Row::parse)?;
         let (timings, timings_clean) = lines_if_any(&results::timings_path(out), results::parse_timing)?;
         let rows: HashMap<String, Row> = in_file.iter().map(|row| (row.id().to_owned(), row.clone())).collect();
-        let states = plan.items.iter().map(|item| state(item, rows.get(&item.id), out)).collect();
+        let wanted = |batch: &Batch| batches(plan, &rows, &batch.reference_id).is_some_and(|n| batch.number < n);
+        let state = |item: &WorkItem| match item.batch() {
+            Some(batch) if !wanted(batch) => State::Optional,
+            _ => state(item, rows.get(&item.id), out),
+        };
+        let states = plan.items.iter().map(state).collect();
         let timings = timings.into_iter().map(|timing| (timing.id.clone(), timing)).collect();
         Ok(Self { rows, in_file, timings, states, is_clean: rows_clean && timings_clean })
     }
 }
 
-/// The state of one item.
-fn state(item: &WorkItem, row: Option<&Row>, out: &Path) -> State {
+/// How many batches each half of a growing reference has, where a row that holds says so.
+pub(super) fn batches(plan: &Plan, rows: &HashMap<String, Row>, reference_id: &str) -> Option<u32> {
+    let item = &plan.items[plan.position(reference_id)?];
+    match rows.get(reference_id).filter(|row| is_result_of(row, item))? {
+        Row::Reference(row) => row.growth.as_ref().map(|growth| growth.batches),
+        _ => None,
+    }
+}
+
+/// Whether an item is a batch that its reference, whose row is there, does without.
+pub(super) fn is_unwanted(plan: &Plan, rows: &HashMap<String, Row>, item: &WorkItem) -> bool {
+    let known = |batch: &Batch| batches(plan, rows, &batch.reference_id).is_some_and(|known| batch.number >= known);
+    item.batch().is_some_and(known)
+}
+
+/// The state of one item that is wanted.
+pub(super) fn state(item: &WorkItem, row: Option<&Row>, out: &Path) -> State {
     let Some(row) = row.filter(|row| is_result_of(row, item)) else { return State::Missing };
     match item.kept_image() {
         Some(size) if item.is_shown && images::stored(out, &item.id, size, row.kept_pixels()).is_none() => {
@@ -114,16 +140,20 @@ pub(super) fn is_result_of(row: &Row, item: &WorkItem) -> bool {
 pub struct Survey {
     /// Items by kind: all, and those left.
     pub items: Vec<(Kind, usize, usize)>,
-    /// Samples of all these items.
+    /// Samples of all these items, without what references may yet grow by.
     pub samples: u64,
-    /// Samples left to render.
+    /// Samples left to render, without what references may yet grow by.
     pub samples_left: u64,
+    /// The most samples that references may grow by beyond that.
+    pub samples_growth: u64,
     /// Samples per second expected with the threads given.
     pub rate: f64,
     /// Whether the rate comes from the folder's own timings.
     pub is_rate_measured: bool,
     /// Seconds expected for what is left.
     pub seconds_left: f64,
+    /// The most seconds that references may grow by beyond that.
+    pub seconds_growth: f64,
     /// Bytes held at the most, scenes among them.
     pub memory_bytes: u64,
     /// Bytes on disk at the end, before compression.
@@ -138,21 +168,26 @@ impl Survey {
 
     /// Surveys the items at `part` of a plan. Memory and disk are those of the whole, which no part exceeds.
     pub fn of_part(plan: &Plan, standing: &Standing, out: &Path, threads: usize, part: Range<usize>) -> Self {
-        let left: Vec<usize> = part.clone().filter(|&position| standing.states[position] != State::Done).collect();
+        let is_left = |&position: &usize| !matches!(standing.states[position], State::Done | State::Optional);
+        let left: Vec<usize> = part.clone().filter(is_left).collect();
+        let samples_growth = samples_growth(plan, standing, out, part.clone());
         let samples_left = samples_left(plan, standing, out, &left);
         let (rate, is_rate_measured) = rate(standing, threads);
         let pairs: u64 = left.iter().map(|&position| plan.items[position].pairs()).sum();
         let kept: Vec<Size> = plan.items.iter().filter_map(WorkItem::kept_image).collect();
         Self {
-            items: count_kinds(plan, part.clone(), &left),
-            samples: plan.items[part].iter().map(WorkItem::samples).sum(),
+            items: count_kinds(plan, standing, part.clone(), &left),
+            samples: wanted(standing, part).map(|position| plan.items[position].samples()).sum(),
             samples_left,
+            samples_growth,
             rate,
             is_rate_measured,
             seconds_left: samples_left as f64 / rate + pairs as f64 / PAIR_RATE,
+            seconds_growth: samples_growth as f64 / rate,
             memory_bytes: memory_bytes(plan),
             disk_bytes: kept.iter().map(|size| size.pixels() * BYTES_A_PIXEL).sum::<u64>()
-                + plan.items.len() as u64 * BYTES_AN_ITEM,
+                + plan.items.len() as u64 * BYTES_AN_ITEM
+                + halves_bytes(plan),
         }
     }
 
@@ -192,10 +227,10 @@ impl Default for Limits {
 }
 
 /// Items by kind, in the order in which kinds first occur.
-fn count_kinds(plan: &Plan, part: Range<usize>, left: &[usize]) -> Vec<(Kind, usize, usize)> {
+fn count_kinds(plan: &Plan, standing: &Standing, part: Range<usize>, left: &[usize]) -> Vec<(Kind, usize, usize)> {
     let left: HashSet<usize> = left.iter().copied().collect();
     let mut counts: Vec<(Kind, usize, usize)> = Vec::new();
-    for position in part {
+    for position in wanted(standing, part) {
         let item = &plan.items[position];
         let missing = usize::from(left.contains(&position));
         match counts.iter_mut().find(|(kind, ..)| *kind == item.kind()) {
@@ -209,18 +244,62 @@ fn count_kinds(plan: &Plan, part: Range<usize>, left: &[usize]) -> Vec<(Kind, us
     counts
 }
 
+/// Positions without the batches that nothing is known to want.
+fn wanted(standing: &Standing, part: Range<usize>) -> impl Iterator<Item = usize> {
+    part.filter(|&position| standing.states[position] != State::Optional)
+}
+
+/// Whether an image is there to be used.
+fn is_there(standing: &Standing, out: &Path, id: &str) -> bool {
+    standing.timings.contains_key(id) && results::image_path(out, id).exists()
+}
+
+/// Samples of the further batches of references of which it is not known how far they grow.
+fn samples_growth(plan: &Plan, standing: &Standing, out: &Path, part: Range<usize>) -> u64 {
+    let is_open = |batch: &Batch| batches(plan, &standing.rows, &batch.reference_id).is_none();
+    let open = plan.items[part].iter().filter(|item| item.batch().is_some_and(is_open));
+    open.filter(|item| !is_there(standing, out, &item.id)).map(WorkItem::samples).sum()
+}
+
+/// Bytes of the references as images of their own ([`results::reference_path`]).
+fn halves_bytes(plan: &Plan) -> u64 {
+    let bytes = |item: &WorkItem| match &item.work {
+        Work::Reference(work) => {
+            work.source.parts().len() as u64 * (work.size.pixels() * BYTES_A_PIXEL + BYTES_AN_ITEM)
+        }
+        _ => 0,
+    };
+    plan.items.iter().map(bytes).sum()
+}
+
 /// Samples of the images that items left need and that are not on disk; a file that turns out torn costs more.
 fn samples_left(plan: &Plan, standing: &Standing, out: &Path, left: &[usize]) -> u64 {
     let needed: HashSet<&str> = left
         .iter()
         .flat_map(|&position| match standing.states[position] {
             State::ImageMissing => vec![plan.items[position].id.as_str()],
-            _ => plan.images_needed(position),
+            _ => needed_as_grown(plan, standing, position),
         })
         .collect();
-    let is_there = |id: &str| standing.timings.contains_key(id) && results::image_path(out, id).exists();
-    let to_render = needed.into_iter().filter(|id| !is_there(id)).filter_map(|id| plan.position(id));
+    let to_render = needed.into_iter().filter(|id| !is_there(standing, out, id)).filter_map(|id| plan.position(id));
     to_render.map(|position| plan.items[position].samples()).sum()
+}
+
+/// Images that an item needs, with the further batches of its reference where it is known how far that grew.
+fn needed_as_grown<'a>(plan: &'a Plan, standing: &Standing, position: usize) -> Vec<&'a str> {
+    let mut needed = plan.images_needed(position);
+    let reference_id = match &plan.items[position].work {
+        Work::Image(work) => work.reference_id.as_deref(),
+        Work::Ensemble(work) => Some(work.reference_id.as_str()),
+        Work::Reference(_) | Work::Points(_) => None,
+    };
+    if let Some(id) = reference_id
+        && let Some((growth, known)) = plan.growth(id).zip(batches(plan, &standing.rows, id))
+    {
+        let halves = growth.batches.iter();
+        needed.extend(halves.flat_map(|half| half.iter().take(known as usize).map(String::as_str)));
+    }
+    needed
 }
 
 /// Samples per second with so many threads, from the timings where there are any.
@@ -252,7 +331,9 @@ fn memory_bytes(plan: &Plan) -> u64 {
     }
     let largest = plan.items.iter().filter_map(WorkItem::kept_image).map(Size::pixels).max().unwrap_or(0);
     let scenes: u64 = plan.scenes.iter().map(|scene| scene.memory_bytes).sum();
-    PROGRAM_BYTES + most_pixels * BYTES_A_PIXEL + largest * WORK_BYTES_A_PIXEL + scenes
+    let grows = plan.items.iter().any(|item| item.batch().is_some());
+    let work = WORK_BYTES_A_PIXEL + if grows { GROWTH_BYTES_A_PIXEL } else { 0 };
+    PROGRAM_BYTES + most_pixels * BYTES_A_PIXEL + largest * work + scenes
 }
 
 /// Bytes for a reader.
@@ -276,6 +357,10 @@ impl fmt::Display for Survey {
             self.samples_left as f64 / 1e6
         )?;
         let source = if self.is_rate_measured { "measured here" } else { "stated, nothing timed yet" };
+        if self.samples_growth > 0 {
+            let (samples, seconds) = (self.samples_growth as f64 / 1e6, self.seconds_growth);
+            writeln!(f, "growth         {samples:>10.1} M, {seconds:.1} s more at most: references that grow")?;
+        }
         writeln!(f, "time           {:>10.1} s at {:.2} M samples/s ({source})", self.seconds_left, self.rate / 1e6)?;
         writeln!(f, "memory         {:>12} at most", bytes(self.memory_bytes))?;
         write!(f, "disk           {:>12} at most", bytes(self.disk_bytes))

@@ -11,7 +11,7 @@ use crate::sampling::{Decision, Order, Points, SamplerSet, SamplerSpec};
 use crate::stats::Estimate;
 use crate::stats::moments::student_t_quantile;
 
-use super::evidence::{Answer, below, ratio};
+use super::evidence::{Answer, above, below, ratio};
 use super::summarise::{Cell, Summary};
 
 /// What an exchange asks.
@@ -162,9 +162,55 @@ impl Ablation<'_> {
         source(&errors, (self.base_cell.mse, freedom(self.base_cell)))
     }
 
-    /// 1 − Σ gone: in a [`Question::Share`] what is left to interactions of decisions, and to what a decision's own points
-    /// leave of its main effect. `None` where a decision has no exchange.
-    pub fn left(&self) -> Option<Estimate> {
+    /// Whether the exchange of part `i` alone takes more than half of the error away, at a joint level of 95 % over the
+    /// decisions.
+    pub fn is_over_half(&self, i: usize) -> Answer {
+        let tests = self.parts.len();
+        let cell = |cell: &Cell| widened((cell.mse, freedom(cell)), tests);
+        ratio(&cell(self.parts[i].cell), &cell(self.base_cell)).map_or(Answer::CannotTell, |ratio| below(&ratio, 0.5))
+    }
+
+    /// Whether the error grows by each exchange alone, at a joint level of 95 % over the decisions.
+    pub fn grows_by_each(&self) -> bool {
+        let tests = self.parts.len();
+        let cell = |cell: &Cell| widened((cell.mse, freedom(cell)), tests);
+        let grows = |part: &Part| {
+            let ratio = ratio(&cell(part.cell), &cell(self.base_cell));
+            ratio.is_some_and(|ratio| above(&ratio, 1.0) == Answer::Yes)
+        };
+        !self.parts.is_empty() && self.parts.iter().all(grows)
+    }
+
+    /// In a [`Question::Coupling`] the decisions whose exchange alone takes more than half of the error away, largest
+    /// share first, where they are several. Shares of more than half overlap: parting either decision cures the same
+    /// coupling, which is theirs together and no single one's.
+    pub fn coupled(&self) -> Vec<usize> {
+        let is_large = |i: &usize| self.is_over_half(*i) == Answer::Yes;
+        let mut large: Vec<usize> = match self.question {
+            Question::Coupling => (0..self.parts.len()).filter(is_large).collect(),
+            _ => Vec::new(),
+        };
+        large.sort_by(|&a, &b| self.parts[b].gone.value.total_cmp(&self.parts[a].gone.value));
+        if large.len() > 1 { large } else { Vec::new() }
+    }
+
+    /// In a [`Question::Share`] the most that interactions of decisions can carry: what all well-spread points at once leave,
+    /// 1 − all, or what is left when the single shares are taken off, 1 − Σ gone, where that is clearly less.
+    ///
+    /// Both are upper bounds: points in orders of their own leave interactions as they were, and of main effects what so
+    /// many points miss. Points joint over the decisions (the other sampler in step) can take interactions away, so then
+    /// the first says nothing. `None` where neither can be had.
+    pub fn interactions(&self) -> Option<Estimate> {
+        if self.question != Question::Share {
+            return None;
+        }
+        let is_apart = self.other.order != Order::Step;
+        let all = self.all.as_ref().filter(|_| is_apart).map(|(_, share)| gone(share));
+        tighter(all, self.left())
+    }
+
+    /// 1 − Σ gone; `None` where a decision has no exchange.
+    fn left(&self) -> Option<Estimate> {
         if !self.absent.is_empty() {
             return None;
         }
@@ -174,6 +220,17 @@ impl Ablation<'_> {
         let left =
             Estimate { value: over_base.value + shift, ci95: over_base.ci95.map(|ends| ends.map(|end| end + shift)) };
         Some(left)
+    }
+}
+
+/// Of two upper bounds the first, unless the second's interval lies below it.
+fn tighter(first: Option<Estimate>, second: Option<Estimate>) -> Option<Estimate> {
+    match (first, second) {
+        (Some(first), Some(second)) => {
+            let low = first.ci95.map_or(first.value, |[low, _]| low);
+            Some(if below(&second, low) == Answer::Yes { second } else { first })
+        }
+        (first, second) => first.or(second),
     }
 }
 
@@ -274,6 +331,96 @@ mod tests {
             assert_eq!(source(&far, measured(3.0, key(7))), Source::One(1));
         }
         assert!(missed <= 28, "{missed} of 300");
+    }
+
+    /// A bound that is not clearly the lower of two is not taken, or the one with more noise would win by it.
+    #[test]
+    fn of_two_bounds_the_second_is_taken_only_where_it_is_clearly_lower() {
+        let e = |value: f64, half: f64| Estimate { value, ci95: Some([value - half, value + half]) };
+        let value = |a, b| tighter(a, b).map(|bound: Estimate| bound.value);
+        assert_eq!(value(Some(e(0.3, 0.02)), Some(e(0.4, 0.2))), Some(0.3));
+        assert_eq!(value(Some(e(0.3, 0.02)), Some(e(0.2, 0.1))), Some(0.3), "perhaps lower");
+        assert_eq!(value(Some(e(0.3, 0.02)), Some(e(0.2, 0.05))), Some(0.2));
+        assert_eq!(value(None, Some(e(0.2, 0.1))), Some(0.2));
+        assert_eq!(value(None, None), None);
+    }
+
+    fn cell(mse: f64) -> Cell {
+        let e = Estimate { value: mse, ci95: Some([0.98 * mse, 1.02 * mse]) };
+        Cell {
+            scene: 0,
+            sampler: 0,
+            id: String::new(),
+            spp: crate::experiment::results::Count { asked: 16, taken: 16 },
+            replicates: 8,
+            is_fixed: false,
+            is_reference_limited: false,
+            mse: e,
+            rmse: None,
+            rel_mse: e,
+            bias2: e,
+            variance: None,
+            bias: e,
+            error_autocorrelation: None,
+            replicate_mse: Vec::new(),
+            replicate_mean: Vec::new(),
+            pixels: Vec::new(),
+            twins: Vec::new(),
+        }
+    }
+
+    /// From an error of 1, within 2 percent, to `errors` of the parts and of all at once.
+    fn with_group<T>(question: Question, errors: &[f64], all: f64, see: impl Fn(&Ablation) -> T) -> T {
+        let (base, cells, end) = (cell(1.0), errors.iter().map(|&e| cell(e)).collect::<Vec<_>>(), cell(all));
+        let gone = |cell: &Cell| gone(&ratio(&cell.mse, &base.mse).unwrap());
+        let part = |(cell, decision): (_, &Decision)| Part { decision: *decision, cell, gone: gone(cell) };
+        let other = SamplerSpec::parse("ld:shuffle:xor@each", crate::sampling::Preset::Best).unwrap();
+        see(&Ablation {
+            scene: 0,
+            base: 0,
+            other,
+            question,
+            spp: 16,
+            base_cell: &base,
+            parts: cells.iter().zip(&Decision::ALL).map(part).collect(),
+            absent: Vec::new(),
+            all: Some((&end, gone(&end))),
+        })
+    }
+
+    #[test]
+    fn an_error_comes_from_a_decision_that_takes_more_than_half_away() {
+        let answers = |group: &Ablation| (0..3).map(|i| group.is_over_half(i)).collect::<Vec<_>>();
+        let found = with_group(Question::Share, &[0.3, 0.5, 0.94], 0.2, answers);
+        assert_eq!(found, [Answer::Yes, Answer::CannotTell, Answer::No]);
+    }
+
+    #[test]
+    fn a_coupling_belongs_to_all_decisions_that_each_cure_more_than_half_of_it() {
+        let coupled = |question, errors: &[f64]| with_group(question, errors, 0.1, |group| group.coupled());
+        assert_eq!(coupled(Question::Coupling, &[0.30, 0.17, 0.86]), [1, 0], "largest first");
+        assert!(coupled(Question::Coupling, &[0.7, 0.17, 0.86]).is_empty(), "one with the others");
+        assert!(coupled(Question::Coupling, &[0.3, 0.5, 0.86]).is_empty(), "perhaps over half is not over half");
+        assert!(coupled(Question::Share, &[0.30, 0.17, 0.86]).is_empty());
+    }
+
+    #[test]
+    fn an_error_grows_by_each_exchange_only_where_the_joint_level_says_so() {
+        let grows = |errors: &[f64]| with_group(Question::Coupling, errors, 1.0, |group| group.grows_by_each());
+        assert!(grows(&[1.3, 1.1]));
+        // Above 1 by a plain interval, which two comparisons at once widen by a fifth.
+        assert!(!grows(&[1.3, 1.03]) && !grows(&[1.3, 0.9]));
+        assert!(grows(&[1.03]), "one comparison widens nothing");
+    }
+
+    #[test]
+    fn interactions_carry_no_more_than_what_all_decisions_at_once_leave() {
+        let most = |errors: &[f64], all| {
+            with_group(Question::Share, errors, all, |group| group.interactions().map(|most| most.value)).unwrap()
+        };
+        assert!((most(&[0.8, 0.7], 0.2) - 0.2).abs() < 1e-12, "the single shares leave 50 %");
+        assert!((most(&[0.6, 0.5], 0.4) - 0.1).abs() < 1e-12, "the single shares leave 10 %");
+        assert_eq!(with_group(Question::Coupling, &[0.6, 0.5], 0.4, |group| group.interactions()), None);
     }
 
     #[test]

@@ -17,7 +17,7 @@ use super::pictures::{NamedPoints, point_set_contact_sheet};
 use super::plots::{Datum, Floor, Guide, Plot, Series, loglog_chart, small_multiples};
 use super::provenance;
 use super::shares::{Share, SharePanel, share_chart};
-use super::stability::{Against, count_against, passes_against};
+use super::stability::{Against, Stretch, count_against, passes_against};
 use super::summarise::{Subject, Summary};
 
 /// The points of the sheet's Figure 2.
@@ -70,7 +70,7 @@ pub fn discrepancy(summary: &Summary) -> Option<Figure> {
         .filter_map(|sampler| {
             let datum = |set: &super::summarise::PointSet| {
                 let mean = set.mean?;
-                Some(Datum { x: f64::from(set.n.taken), y: mean.value, interval: ends(&mean) })
+                Some(Datum { x: f64::from(set.n.taken), y: mean.value, interval: ends(&mean), is_pale: false })
             };
             let sets = summary.point_sets.iter().filter(|set| set.sampler == sampler && set.metric == "star");
             let points: Vec<Datum> = sets.filter_map(datum).collect();
@@ -120,7 +120,9 @@ pub fn convergence(summary: &Summary) -> Option<Figure> {
     if panels.iter().all(|plot| plot.series.is_empty()) {
         return None;
     }
-    let subtitle = format!("{}, 95 % bands; dotted: the reference's own noise", replicates(summary));
+    let is_pale = summary.cells.iter().any(|cell| cell.is_reference_limited);
+    let pale = if is_pale { "; pale: reference-limited" } else { "" };
+    let subtitle = format!("{}, 95 % bands; dotted: the reference's own noise{pale}", replicates(summary));
     let axes = ["samples per pixel", "RMSE (radiance, W/(m² sr))"];
     let frame = frame(summary, "Error against samples per pixel", &subtitle, axes);
     Some(small_multiples(&frame, &panels, summary.scenes.len().clamp(1, 3)))
@@ -130,7 +132,8 @@ fn panel(summary: &Summary, scene: usize, samplers: &[usize], words: &str) -> Pl
     let of = |&sampler: &usize| {
         let datum = |cell: &&super::summarise::Cell| {
             let rmse = cell.rmse?;
-            Some(Datum { x: f64::from(cell.spp.taken), y: rmse.value, interval: ends(&rmse) })
+            let (x, is_pale) = (f64::from(cell.spp.taken), cell.is_reference_limited);
+            Some(Datum { x, y: rmse.value, interval: ends(&rmse), is_pale })
         };
         let points: Vec<Datum> = summary.cells_of(scene, sampler).iter().filter_map(datum).collect();
         (!points.is_empty()).then(|| series(summary, sampler, points))
@@ -179,8 +182,9 @@ pub fn stability(summary: &Summary) -> Option<Figure> {
     if asked.spp > 1 {
         kinds.push(format!("1 + {} spp in two passes", asked.spp - 1));
     }
+    let stretch = Stretch::of(summary);
     let dot = |kind: usize, against: Option<Against>| {
-        let excess = against?.excess;
+        let excess = stretch.stretched(&against?);
         Some(Dot { kind, value: excess.value, interval: ends(&excess) })
     };
     let row = |subject: &Subject| {
@@ -197,8 +201,18 @@ pub fn stability(summary: &Summary) -> Option<Figure> {
         })
         .filter(|group| !group.rows.is_empty())
         .collect();
-    let subtitle = format!("against one pass of {} spp; {}, 95 % intervals", asked.spp, replicates(summary));
-    let frame = frame(summary, "A sample more or less", &subtitle, ["RMSE / promised RMSE (no unit)", ""]);
+    let subtitle = format!(
+        "against one pass of {} spp; {}, 95 % intervals stretched for {}",
+        asked.spp,
+        replicates(summary),
+        counted(stretch.comparisons, "comparison", "comparisons")
+    );
+    let frame = frame(
+        summary,
+        "Other counts and two passes, against what is promised",
+        &subtitle,
+        ["RMSE / promised RMSE (no unit)", ""],
+    );
     Some(dot_chart(&frame, &kinds, 1.0, &groups))
 }
 

@@ -10,7 +10,7 @@ use super::details::{Detail, Stages, Truth, details};
 use super::figure::Rgb8;
 use super::numbers::{short, signed};
 use super::pictures::{Crop, ScaleBar, StripCell, StripLayout, error_map, error_scale, strip};
-use super::shots::{PictureSet, Shot};
+use super::shots::{PictureSet, Shot, equal_time};
 use super::summarise::Summary;
 
 /// Reads an image; one that is not there is an error like any other.
@@ -96,7 +96,7 @@ pub fn strips(dir: &Path, summary: &Summary, set: &PictureSet) -> Result<Strips>
     let found = find_details(dir, set, &truth, &images);
     let crops: Vec<Crop> = found.iter().map(|detail| detail.crop).collect();
     let on_screen = shown(&truth.mean, set.exposure);
-    let equal_time = match summary.uniform().and_then(|uniform| set.at_equal_time(uniform)) {
+    let equal_time = match equal_time(summary, set) {
         Some(chosen) if !crops.is_empty() => {
             let timed: Vec<Shown> = chosen
                 .choices

@@ -21,6 +21,8 @@ pub struct Datum {
     pub y: f64,
     /// Its interval, low and high, in the units of `y`; drawn as a translucent band.
     pub interval: Option<(f64, f64)>,
+    /// Drawn with a pale marker: to be read with care.
+    pub is_pale: bool,
 }
 
 /// A named line of values.
@@ -332,7 +334,14 @@ impl<'a> Panel<'a> {
             let below = (x, on_line(x - width).max(on_line(x)) + 11.0);
             [above, below].map(|at| (text(at).bounds(), at))
         });
-        if let Some((bounds, at)) = first_free(candidates, &self.b, taken) {
+        // Between the grid's vertical lines where there is room, so that none cuts the text.
+        let rulers = self.axes.x_ticks.iter().map(|&tick| self.x.pixel(tick));
+        let ruled: Vec<Bounds> = rulers
+            .map(|x| Bounds { left: x - 1.0, top: self.b.top, right: x + 1.0, bottom: self.b.bottom })
+            .chain(taken.iter().copied())
+            .collect();
+        let found = first_free(candidates.clone(), &self.b, &ruled).or_else(|| first_free(candidates, &self.b, taken));
+        if let Some((bounds, at)) = found {
             taken.push(bounds);
             drawing.add_text(text(at));
         }
@@ -351,7 +360,10 @@ impl<'a> Panel<'a> {
         }
         let radius = if self.b.right - self.b.left > 350.0 { 3.6 } else { 2.8 };
         for series in &plot.series {
-            self.places(series).into_iter().for_each(|at| draw_marker(drawing, at, radius, &series.style));
+            let pale = Style { colour: lightened(series.style.colour, 0.65), ..series.style };
+            for (point, at) in series.points.iter().zip(self.places(series)) {
+                draw_marker(drawing, at, radius, if point.is_pale { &pale } else { &series.style });
+            }
         }
         let ending = |s: &Series| {
             let at = *self.places(s).last()?;
@@ -423,7 +435,7 @@ mod tests {
     ];
 
     fn datum(x: f64, y: f64) -> Datum {
-        Datum { x, y, interval: Some((0.9 * y, 1.1 * y)) }
+        Datum { x, y, interval: Some((0.9 * y, 1.1 * y)), is_pale: false }
     }
 
     fn frame() -> Frame {
@@ -455,7 +467,8 @@ mod tests {
 
     fn any_plot() -> impl Strategy<Value = Plot> {
         let point = (0u32..12, value(), prop::option::of((value(), value())));
-        let point = point.prop_map(|(k, y, interval)| Datum { x: libm::exp2(k.into()), y, interval });
+        let point =
+            point.prop_map(|(k, y, interval)| Datum { x: libm::exp2(k.into()), y, interval, is_pale: k % 2 == 0 });
         let series = (prop::sample::select(&NAMES[..]), prop::collection::vec(point, 0..9));
         let series = series.prop_map(|(name, points)| Series::of_sampler(name, points));
         (prop::collection::vec(series, 0..14), value()).prop_map(|(series, floor)| Plot {
@@ -500,7 +513,8 @@ mod tests {
 
     #[test]
     fn points_that_no_logarithm_shows_are_counted_by_cause_and_their_series_named() {
-        let bad = [0.0, -1.0, f64::NAN, f64::INFINITY, 0.0].map(|y| Datum { x: 1.0, y, interval: None });
+        let bad =
+            [0.0, -1.0, f64::NAN, f64::INFINITY, 0.0].map(|y| Datum { x: 1.0, y, interval: None, is_pale: false });
         let series = vec![line("uniform", 1.0, -0.5), Series::of_sampler("ld:best", bad.to_vec())];
         let svg = loglog_chart(&frame(), &plot(series)).svg;
         let note = "3 points not shown: not above 0 · 2 points not shown: not finite · no data: ld:best";

@@ -3,6 +3,9 @@
 use crate::experiment::results::{ImageRow, ReferenceRow, Stage};
 use crate::experiment::spec::Pictures;
 
+use super::evidence::interpolated;
+use super::summarise::Summary;
+
 /// How far above the budget a picture's seconds may be that stands for equal time.
 pub const OVER_BUDGET: f64 = 0.1;
 
@@ -56,14 +59,39 @@ pub struct EqualTime<'a> {
 pub struct Choice<'a> {
     /// The picture.
     pub shot: &'a Shot,
-    /// Its seconds.
+    /// Its seconds, see [`expected_seconds`].
     pub seconds: f64,
     /// Whether the ladder of counts ends here although the budget would allow more: no dearer picture was made, and this
     /// one stays more than [`OVER_BUDGET`] below it.
     pub is_last_rung: bool,
 }
 
+/// Seconds that a picture takes, by the replicates of the statistics rather than by its own one timing, which other work on the
+/// machine may have doubled: the median seconds of the same scene and sampler, between their counts on a straight line of
+/// logarithms, times the ratio of the pixels.
+///
+/// `None` where those were not timed, or the picture's count lies outside theirs.
+pub fn expected_seconds(summary: &Summary, set: &PictureSet, shot: &Shot) -> Option<f64> {
+    let of_sampler = summary.speeds.iter().filter(|speed| (speed.scene, speed.sampler) == (set.scene, shot.sampler));
+    let mut medians: Vec<_> = of_sampler.map(|speed| (f64::from(speed.spp.taken), speed.seconds)).collect();
+    medians.sort_by(|a, b| a.0.total_cmp(&b.0));
+    medians.dedup_by(|a, b| a.0 == b.0);
+    let pixels = set.pictures.size.pixels() as f64 / summary.scenes[set.scene].pixels as f64;
+    Some(interpolated(&medians, f64::from(shot.row.spp.taken))?.value * pixels)
+}
+
+/// The pictures of a set at equal time, by [`expected_seconds`].
+pub fn equal_time<'a>(summary: &Summary, set: &'a PictureSet) -> Option<EqualTime<'a>> {
+    set.at_equal_time(summary.uniform()?, |shot| expected_seconds(summary, set, shot))
+}
+
 impl EqualTime<'_> {
+    /// Whether the machine had other work while the pictures were made. The threads at work make the load average their number;
+    /// one more is somebody else's.
+    pub fn is_loaded(&self) -> bool {
+        self.load().is_some_and(|([_, high], threads)| high > threads as f64 + 1.0)
+    }
+
     /// The range of the load averages, and the threads, of the pictures that are shown; `None` where no load is known.
     pub fn load(&self) -> Option<([f64; 2], usize)> {
         let known: Vec<(usize, f64)> = self.choices.iter().filter_map(|choice| choice.shot.threads_and_load).collect();
@@ -97,9 +125,10 @@ impl PictureSet {
 
     /// For each sampler the picture whose seconds come nearest (as a ratio) to those of `uniform` at the count of the
     /// comparison at equal samples, and are no more than [`OVER_BUDGET`] above them. `None` where there is but one count,
-    /// or where that picture was not timed.
-    pub fn at_equal_time(&self, uniform: usize) -> Option<EqualTime<'_>> {
-        let budget = self.shot(uniform, self.pictures.equal_spp())?.seconds.filter(|&seconds| seconds > 0.0)?;
+    /// or where the seconds of that picture are not known.
+    pub fn at_equal_time(&self, uniform: usize, seconds: impl Fn(&Shot) -> Option<f64>) -> Option<EqualTime<'_>> {
+        let seconds = |shot: &Shot| seconds(shot).filter(|&seconds| seconds > 0.0);
+        let budget = seconds(self.shot(uniform, self.pictures.equal_spp())?)?;
         if self.pictures.spp.len() < 2 {
             return None;
         }
@@ -108,8 +137,7 @@ impl PictureSet {
         let mut found = EqualTime { budget, choices: Vec::new(), too_dear: Vec::new() };
         for sampler in samplers {
             let rungs = self.shots.iter().filter(|shot| shot.sampler == sampler);
-            let timed: Vec<(&Shot, f64)> =
-                rungs.filter_map(|shot| Some((shot, shot.seconds.filter(|&s| s > 0.0)?))).collect();
+            let timed: Vec<(&Shot, f64)> = rungs.filter_map(|shot| Some((shot, seconds(shot)?))).collect();
             let most = timed.iter().map(|(shot, _)| shot.row.spp.taken).max();
             let far = |seconds: f64| libm::fabs(libm::log(seconds / budget));
             let affordable = timed.iter().filter(|(_, seconds)| *seconds <= budget * (1.0 + OVER_BUDGET));
@@ -149,6 +177,7 @@ mod tests {
                 names: Vec::new(),
                 spp: Count { asked: spp[i], taken: spp[i] },
                 replicate: 0,
+                batch: 0,
                 seed: 0,
                 estimator: Estimator::Unbiased,
                 stage: Stage::Final,
@@ -175,7 +204,7 @@ mod tests {
     }
 
     fn chosen(set: &PictureSet) -> Vec<(u32, bool)> {
-        let found = set.at_equal_time(0).unwrap();
+        let found = set.at_equal_time(0, |shot| shot.seconds).unwrap();
         found.choices.iter().map(|choice| (choice.shot.row.spp.asked, choice.is_last_rung)).collect()
     }
 
@@ -194,17 +223,28 @@ mod tests {
     fn a_ladder_that_does_not_reach_the_budget_says_so() {
         assert_eq!(chosen(&set([[0.5, 1.0, 2.0], [0.1, 0.2, 0.4]])), [(16, false), (32, true)]);
         let dear = set([[0.5, 1.0, 2.0], [2.0, 4.0, 8.0]]);
-        assert_eq!(dear.at_equal_time(0).unwrap().too_dear, [1]);
+        assert_eq!(dear.at_equal_time(0, |shot| shot.seconds).unwrap().too_dear, [1]);
         assert_eq!(chosen(&dear), [(16, false)]);
-        assert_eq!(dear.at_equal_time(0).unwrap().load(), Some(([16.0; 2], 2)));
+        assert_eq!(dear.at_equal_time(0, |shot| shot.seconds).unwrap().load(), Some(([16.0; 2], 2)));
+    }
+
+    #[test]
+    fn a_load_above_the_threads_at_work_is_other_work() {
+        let mut set = set([[0.5, 1.0, 2.0], [0.5, 1.0, 2.0]]);
+        let is_loaded = |set: &PictureSet| set.at_equal_time(0, |shot| shot.seconds).unwrap().is_loaded();
+        assert!(is_loaded(&set), "a load of 16 on 2 threads");
+        set.shots.iter_mut().for_each(|shot| shot.threads_and_load = Some((2, 2.9)));
+        assert!(!is_loaded(&set));
+        set.shots.iter_mut().for_each(|shot| shot.threads_and_load = None);
+        assert!(!is_loaded(&set), "not known");
     }
 
     #[test]
     fn without_a_ladder_or_a_timing_of_uniform_nothing_is_shown_at_equal_time() {
         let untimed = set([[0.5, f64::NAN, 2.0], [0.5, 1.0, 2.0]]);
-        assert_eq!(untimed.at_equal_time(0), None);
+        assert_eq!(untimed.at_equal_time(0, |shot| shot.seconds), None);
         let mut single = set([[0.5, 1.0, 2.0], [0.5, 1.0, 2.0]]);
         single.pictures.spp = vec![16];
-        assert_eq!(single.at_equal_time(0), None);
+        assert_eq!(single.at_equal_time(0, |shot| shot.seconds), None);
     }
 }

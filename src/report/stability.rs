@@ -4,10 +4,11 @@
 //! comparisons of the section together call a difference that is not there with a chance of at most 5 % (Bonferroni).
 
 use crate::experiment::results::{TwinDifference, Variant};
+use crate::stats::hypothesis::chi2_upper_tail;
 use crate::stats::moments::student_t_quantile;
-use crate::stats::{Estimate, Moments};
+use crate::stats::{Estimate, IntervalKind, Moments};
 
-use super::evidence::{paired_ratio_of_roots, ratio, ratio_of_roots};
+use super::evidence::{Answer, above, paired_ratio_of_roots, ratio, ratio_of_roots};
 use super::provenance;
 use super::summarise::{Cell, Subject, Summary};
 use super::tables::{estimate_fields, quoted};
@@ -21,15 +22,15 @@ pub const LEAST: f64 = 1.01;
 /// An error is called stable if it is at most this much larger than promised.
 pub const MARGIN: f64 = 1.1;
 
-/// A spread is narrow where the worst replicate's RMSE is at most this much larger than the median, wide where it is more.
-pub const WIDE: f64 = 1.25;
+/// A spread is wide where the coefficient of variation of the replicates' RMSE is more than this.
+pub const WIDE: f64 = 0.1;
 
 /// Images differ by roundings alone if in at most this share of their pixels a ray was moved across an edge…
 pub const JUMPING: f64 = 0.01;
 
-/// … and if they differ by a root mean square of at most this share of their RMSE, so that the RMSE cannot differ by more either
-/// (triangle inequality).
-pub const ROUNDING: f64 = 0.1;
+/// … and if they differ by a root mean square of at most this share of the mean radiance, whatever the sampler's own noise: what
+/// comes of [`JUMPING`] of the pixels if each jumps by a fifth of the mean.
+pub const ROUNDING: f64 = 0.02;
 
 /// What a ratio of errors says, over what is promised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -58,10 +59,12 @@ impl Verdict {
 pub struct Against {
     /// RMSE over the base's.
     pub ratio: Estimate,
-    /// What the sampler itself promises of that ratio.
+    /// What is promised of that ratio.
     pub promised: Estimate,
     /// The one over the other.
     pub excess: Estimate,
+    /// Degrees of freedom of the excess' interval: the least of what it is made of.
+    pub freedom: f64,
 }
 
 /// The section's comparisons, and how far their intervals are stretched.
@@ -69,33 +72,41 @@ pub struct Against {
 pub struct Stretch {
     /// How many ratios are judged.
     pub comparisons: usize,
-    /// Factor of an interval's width.
-    pub factor: f64,
+    /// Degrees of freedom of replicates: R − 1.
+    pub freedom: f64,
 }
 
 impl Stretch {
-    /// For all comparisons of a summary: Student's factor at R − 1 degrees of freedom (intervals of the reference's noise
-    /// alone have more, so they are stretched too far rather than too little).
+    /// For all comparisons of a summary.
     pub fn of(summary: &Summary) -> Self {
         let judged = |subject: &Subject| {
             let passes = subject.remade.iter().filter(|(variant, _)| *variant == Variant::TwoPasses).count();
             subject.counts.len() + passes
         };
-        let comparisons: usize = summary.stability.iter().map(judged).sum();
-        let freedom = f64::from(summary.about.experiment.replicates.max(2) - 1);
-        let quantile = |two_sided: f64| student_t_quantile(1.0 - two_sided / 2.0, freedom);
-        let factor = quantile(FALSE_ALARM / comparisons.max(1) as f64) / quantile(0.05);
-        Self { comparisons, factor }
+        let comparisons = summary.stability.iter().map(judged).sum();
+        Self { comparisons, freedom: replicates_freedom(summary) }
     }
 
-    /// The interval, stretched about its value on a logarithmic scale.
-    fn ends(&self, ratio: &Estimate) -> Option<[f64; 2]> {
-        ratio.ci95.map(|ends| ends.map(|end| ratio.value * libm::pow(end / ratio.value, self.factor)))
+    /// Factor of the width of a 95 % interval: Student's quantile at [`FALSE_ALARM`] shared by the comparisons over that at
+    /// 5 %, both at the interval's degrees of freedom.
+    pub fn factor(&self, freedom: f64) -> f64 {
+        let quantile = |two_sided: f64| student_t_quantile(1.0 - two_sided / 2.0, freedom);
+        quantile(FALSE_ALARM / self.comparisons.max(1) as f64) / quantile(0.05)
+    }
+
+    /// The excess with its interval stretched about its value on a logarithmic scale: what a verdict rests on.
+    pub fn stretched(&self, against: &Against) -> Estimate {
+        let (excess, factor) = (against.excess, self.factor(against.freedom));
+        let stretched = |end: f64| match end == excess.value {
+            true => end,
+            false => excess.value * libm::pow(end / excess.value, factor),
+        };
+        Estimate { value: excess.value, ci95: excess.ci95.map(|ends| ends.map(stretched)) }
     }
 
     /// What the excess of an error says.
-    pub fn judge(&self, excess: &Estimate) -> Verdict {
-        match self.ends(excess) {
+    pub fn judge(&self, against: &Against) -> Verdict {
+        match self.stretched(against).ci95 {
             Some([low, _]) if low > LEAST => Verdict::Worse,
             Some([_, high]) if high <= MARGIN => Verdict::Stable,
             _ => Verdict::CannotTell,
@@ -103,48 +114,153 @@ impl Stretch {
     }
 }
 
-/// What `taken` samples promise of the RMSE over that of the subject's base: its own slope's power of the counts, 1/√ where no
-/// slope could be fitted; a single sample more than the base promises no harm.
-pub fn promised(summary: &Summary, subject: &Subject, cell: &Cell) -> Estimate {
-    if cell.spp.asked == subject.base.spp.asked + 1 {
-        return exactly(1.0);
+/// R − 1. Intervals of the reference's noise alone, where nothing is random, have more: they are stretched too far rather than
+/// too little.
+fn replicates_freedom(summary: &Summary) -> f64 {
+    f64::from(summary.about.experiment.replicates.max(2) - 1)
+}
+
+/// What a promise rests on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Promise<'a> {
+    /// The base itself: as many samples taken.
+    Same,
+    /// A straight line of logarithms between two measured counts, and the share of the way from the first to the second.
+    Neighbours(&'a Cell, &'a Cell, f64),
+    /// A sample more than the base does no harm; no larger count was measured.
+    NoHarm,
+    /// The sampler's own slope, 1/√ where none was fitted; the count lies outside the measured ones.
+    Slope,
+}
+
+/// What is promised of `cell`: by its neighbours, the nearest powers of two that were compared (and the base), where it lies
+/// between two of them.
+pub fn promise<'a>(summary: &'a Summary, subject: &'a Subject, cell: &Cell) -> Promise<'a> {
+    let taken = cell.spp.taken;
+    if taken == subject.base.spp.taken {
+        return Promise::Same;
     }
+    let known = summary.cells_of(subject.scene, subject.sampler).into_iter();
+    let known = known.filter(|known| known.spp.taken.is_power_of_two() && known.spp.taken == known.spp.asked);
+    let mut known: Vec<&Cell> = known.chain([&subject.base]).filter(|known| known.id != cell.id).collect();
+    known.sort_by_key(|known| known.spp.taken);
+    let below = known.iter().rfind(|known| known.spp.taken <= taken);
+    let above = known.iter().find(|known| known.spp.taken >= taken);
+    match (below, above) {
+        (Some(a), Some(b)) => {
+            let [low, at, high] = [a.spp.taken, taken, b.spp.taken].map(|n| libm::log(f64::from(n)));
+            Promise::Neighbours(a, b, if low < high { (at - low) / (high - low) } else { 0.0 })
+        }
+        _ if cell.spp.asked == subject.base.spp.asked + 1 => Promise::NoHarm,
+        _ => Promise::Slope,
+    }
+}
+
+/// The promised RMSE over the base's, with its degrees of freedom. `None` where a neighbour's error is below the noise.
+fn promised(summary: &Summary, subject: &Subject, cell: &Cell) -> Option<(Estimate, f64)> {
+    let freedom = replicates_freedom(summary);
+    match promise(summary, subject, cell) {
+        Promise::Same | Promise::NoHarm => Some((exactly(1.0), freedom)),
+        Promise::Neighbours(a, b, share) => {
+            Some((power_product(&[(a, 1.0 - share), (b, share), (&subject.base, -1.0)])?, freedom))
+        }
+        Promise::Slope => Some(by_slope(summary, subject, cell, freedom)),
+    }
+}
+
+/// The own slope's power of the counts. A line through one image a count has its scatter's degrees of freedom, two fewer than
+/// points.
+fn by_slope(summary: &Summary, subject: &Subject, cell: &Cell, freedom: f64) -> (Estimate, f64) {
     let counts = f64::from(cell.spp.taken) / f64::from(subject.base.spp.taken);
     let fit = summary.slope(subject.scene, subject.sampler).and_then(|slope| slope.fit.as_ref());
-    let Some(fit) = fit else { return exactly(libm::pow(counts, -0.5)) };
+    let Some(fit) = fit else { return (exactly(libm::pow(counts, -0.5)), freedom) };
     let at = |slope: f64| libm::pow(counts, slope);
     let ci95 = fit.ci95.map(|[low, high]| {
         let (a, b) = (at(low), at(high));
         [a.min(b), a.max(b)]
     });
+    let freedom = match fit.interval {
+        IntervalKind::Residuals => freedom.min((fit.points as f64 - 2.0).max(1.0)),
+        _ => freedom,
+    };
     // A line through two points has no interval: nothing can be told by what it promises.
-    Estimate { value: at(fit.slope), ci95 }
+    (Estimate { value: at(fit.slope), ci95 }, freedom)
 }
 
 fn exactly(value: f64) -> Estimate {
     Estimate { value, ci95: Some([value; 2]) }
 }
 
-/// Another count against the base. The two are independent images.
+/// Π RMSEᵢ^kᵢ of independent cells, with the interval that theirs give on logarithms ("MOVER", as of [`ratio`]): distances of
+/// value and end, times |kᵢ|, add in squares, an end changing sides where kᵢ < 0. A cell that occurs more than once counts
+/// once, with the sum of its exponents: it has one noise.
+///
+/// `None` where an MSE is not above 0; no interval where one has none.
+fn power_product(factors: &[(&Cell, f64)]) -> Option<Estimate> {
+    let mut merged: Vec<(&Cell, f64)> = Vec::new();
+    for (cell, exponent) in factors {
+        match merged.iter_mut().find(|(other, _)| other.id == cell.id) {
+            Some((_, sum)) => *sum += exponent,
+            None => merged.push((cell, *exponent)),
+        }
+    }
+    let (mut log, mut squares) = (0.0, Some([0.0, 0.0]));
+    for (cell, exponent) in merged.into_iter().filter(|(_, exponent)| *exponent != 0.0) {
+        let mse = cell.mse;
+        if mse.value <= 0.0 || !mse.value.is_finite() {
+            return None;
+        }
+        let half = exponent / 2.0;
+        log += half * libm::log(mse.value);
+        let distance = |a: f64, b: f64| if b > 0.0 { libm::log(a / b).max(0.0) } else { f64::INFINITY };
+        squares = squares.zip(mse.ci95).map(|([down, up], [low, high])| {
+            let (to_low, to_high) = (half * distance(mse.value, low), half * distance(high, mse.value));
+            let [to_low, to_high] = if half < 0.0 { [to_high, to_low] } else { [to_low, to_high] };
+            [down + to_low * to_low, up + to_high * to_high]
+        });
+    }
+    let value = libm::exp(log);
+    let ci95 = squares.map(|[down, up]: [f64; 2]| [value * libm::exp(-down.sqrt()), value * libm::exp(up.sqrt())]);
+    Some(Estimate { value, ci95 })
+}
+
+/// Another count against the base. Counts are independent of each other; what ratio and promise share (the base) is counted once.
 pub fn count_against(summary: &Summary, subject: &Subject, cell: &Cell) -> Option<Against> {
-    let promised = promised(summary, subject, cell);
+    let (promised, freedom) = promised(summary, subject, cell)?;
     let ratio_of_errors = ratio_of_roots(&cell.mse, &subject.base.mse)?;
-    Some(Against { ratio: ratio_of_errors, promised, excess: ratio(&ratio_of_errors, &promised)? })
+    let excess = match promise(summary, subject, cell) {
+        Promise::Neighbours(a, b, share) => power_product(&[(cell, 1.0), (a, share - 1.0), (b, -share)])?,
+        _ => ratio(&ratio_of_errors, &promised)?,
+    };
+    Some(Against { ratio: ratio_of_errors, promised, excess, freedom })
 }
 
 /// Two passes against one, replicate by replicate; what is promised is that only the samples taken count.
 pub fn passes_against(summary: &Summary, subject: &Subject, cell: &Cell) -> Option<Against> {
-    let promised = promised(summary, subject, cell);
+    let (promised, freedom) = promised(summary, subject, cell)?;
     let ratio_of_errors = remade_ratio(&subject.base, cell)?;
-    Some(Against { ratio: ratio_of_errors, promised, excess: ratio(&ratio_of_errors, &promised)? })
+    Some(Against { ratio: ratio_of_errors, promised, excess: ratio(&ratio_of_errors, &promised)?, freedom })
 }
 
-/// RMSE of the remade images over that of the plain ones, paired where there are pairs.
+/// RMSE of the remade images over that of the plain ones, paired where there are pairs: then the reference's noise, common to
+/// both, is not in the interval. Of one image each it is all that the interval holds, and counted twice.
 pub fn remade_ratio(base: &Cell, cell: &Cell) -> Option<Estimate> {
-    if base.replicates > 1 && base.replicate_mse.len() == base.replicates as usize {
+    if is_paired(base) {
         return paired_ratio_of_roots(&cell.replicate_mse, &base.replicate_mse);
     }
     ratio_of_roots(&cell.mse, &base.mse)
+}
+
+fn is_paired(base: &Cell) -> bool {
+    base.replicates > 1 && base.replicate_mse.len() == base.replicates as usize
+}
+
+/// [`remade_ratio`] of a scene in another unit of length. One image each has no interval, unless both are exact: the reference's
+/// noise is common to the two and cancels.
+pub fn scaled_ratio(base: &Cell, cell: &Cell) -> Option<Estimate> {
+    let ratio = remade_ratio(base, cell)?;
+    let is_exact = ratio.ci95.is_some_and(|[low, high]| low == high);
+    Some(if is_paired(base) || is_exact { ratio } else { Estimate::without_interval(ratio.value) })
 }
 
 /// What another unit of length does to the images.
@@ -156,7 +272,7 @@ pub enum ScaleVerdict {
     Unchanged,
     /// More than that, in one replicate at least.
     Changed,
-    /// The error that the difference is held against is below the reference's noise, or rows are missing.
+    /// Rows are missing, or the mean radiance is not above 0.
     CannotTell,
 }
 
@@ -181,7 +297,7 @@ pub struct Differences {
     pub jumping: f64,
     /// Largest difference of a pixel-channel over the mean radiance.
     pub largest: f64,
-    /// Root mean square difference over the base's RMSE; `None` where that is not above 0.
+    /// Root mean square difference over the mean radiance; `None` where that is not above 0.
     pub rms: Option<f64>,
     /// How many replicates are the same bit for bit.
     pub same: usize,
@@ -195,7 +311,7 @@ pub fn differences(base: &Cell, twins: &[TwinDifference]) -> Option<Differences>
         differing: worst(&|twin| twin.differing),
         jumping: worst(&|twin| twin.jumping),
         largest: worst(&|twin| twin.largest) / mean,
-        rms: base.rmse.filter(|rmse| rmse.value > 0.0).map(|rmse| worst(&|twin| twin.rms) / rmse.value),
+        rms: (mean > 0.0).then(|| worst(&|twin| twin.rms) / mean),
         same: twins.iter().filter(|twin| twin.differing == 0.0).count(),
     })
 }
@@ -216,11 +332,11 @@ pub fn scale_verdict(base: &Cell, cell: &Cell) -> ScaleVerdict {
 /// What the replicates' spread says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum SpreadVerdict {
-    /// The worst is at most [`WIDE`] times the best, which bounds the median from below.
+    /// The coefficient of variation is at most [`WIDE`] with the whole interval.
     Narrow,
-    /// The worst is more than [`WIDE`] times an upper end of the median's interval.
+    /// It is more with the whole interval.
     Wide,
-    /// The order statistics allow both.
+    /// The interval holds both.
     CannotTell,
 }
 
@@ -233,11 +349,16 @@ pub struct Spread {
     pub worst: f64,
     /// Smallest value over the median.
     pub best: f64,
-    /// The verdict.
+    /// Standard deviation over mean. Unlike a range, it does not grow with the number of replicates.
+    pub variation: Estimate,
+    /// The verdict on it.
     pub verdict: SpreadVerdict,
 }
 
 /// Spread of the replicates; `None` with fewer than two, or where one is below the reference's noise.
+///
+/// The interval is that of a normal standard deviation, s √((R − 1)/χ²) at χ²'s 97.5 % and 2.5 % quantiles with R − 1 degrees of
+/// freedom; an RMSE over many pixels is nearly normal, and what the mean adds is of the order of the variation squared.
 pub fn spread(cell: &Cell) -> Option<Spread> {
     let mut rmse: Vec<f64> = cell.replicate_mse.iter().map(|mse| mse.sqrt()).collect();
     if rmse.len() < 2 || !rmse.iter().all(|&value| value > 0.0) {
@@ -246,55 +367,58 @@ pub fn spread(cell: &Cell) -> Option<Spread> {
     rmse.sort_by(f64::total_cmp);
     let last = rmse.len() - 1;
     let median = (rmse[last / 2] + rmse[rmse.len() / 2]) / 2.0;
-    let (best, worst) = (rmse[0], rmse[last]);
-    let upper = median_is_below(rmse.len()).map(|rank| rmse[rank - 1]);
-    let verdict = match upper {
-        _ if worst <= WIDE * best => SpreadVerdict::Narrow,
-        Some(upper) if worst > WIDE * upper => SpreadVerdict::Wide,
-        _ => SpreadVerdict::CannotTell,
+    let moments: Moments = rmse.iter().copied().collect();
+    let value = moments.std()? / moments.mean()?;
+    let freedom = last as f64;
+    let end = |upper_tail: f64| value * (freedom / chi2_quantile(upper_tail, freedom)).sqrt();
+    let variation = Estimate { value, ci95: Some([end(0.025), end(0.975)]) };
+    let verdict = match above(&variation, WIDE) {
+        Answer::Yes => SpreadVerdict::Wide,
+        Answer::No => SpreadVerdict::Narrow,
+        Answer::CannotTell => SpreadVerdict::CannotTell,
     };
-    Some(Spread { median, worst: worst / median, best: best / median, verdict })
+    Some(Spread { median, worst: rmse[last] / median, best: rmse[0] / median, variation, verdict })
 }
 
-/// The lowest rank (from 1) among `n` values that the median of their distribution exceeds with a chance of at most 5 %:
-/// it does so where at least that many values fall below the median, each with a chance of ½. `None` below 5 values.
-fn median_is_below(n: usize) -> Option<usize> {
-    let (mut tail, mut rank) = (0.0, None);
-    // ln P(k of n), from all n below the median downwards; in logarithms, as 2⁻ⁿ leaves the range of floats.
-    let mut log_share = -(n as f64) * std::f64::consts::LN_2;
-    for k in (1..=n).rev() {
-        tail += libm::exp(log_share);
-        if tail > 0.05 {
+/// The x above which χ² with `freedom` degrees of freedom lies with a chance of `upper_tail`, to 1e-12 of itself: the interval
+/// from 0 doubled until it holds x, then halved.
+fn chi2_quantile(upper_tail: f64, freedom: f64) -> f64 {
+    let mut high = freedom.max(1.0);
+    while chi2_upper_tail(high, freedom) > upper_tail && high < 1e300 {
+        high *= 2.0;
+    }
+    let mut low = 0.0;
+    while high - low > 1e-12 * high {
+        let middle = (low + high) / 2.0;
+        if middle <= low || middle >= high {
             break;
         }
-        rank = Some(k);
-        log_share += libm::log(k as f64 / (n - k + 1) as f64);
+        if chi2_upper_tail(middle, freedom) > upper_tail { low = middle } else { high = middle }
     }
-    rank
+    high
 }
 
 /// `stability.csv`: one line a scene, sampler and comparison with the base, below one line of provenance. Intervals are 95 %
-/// ones, not stretched; empty fields stand for what cannot be had or does not apply.
+/// ones, that of the excess is stretched; empty fields stand for what cannot be had or does not apply.
 pub fn csv(summary: &Summary) -> String {
     let mut text = format!("# {}\n", provenance::line(&summary.about));
     text += "scene,sampler,stands_for,variant,row,base_row,spp_asked,spp_taken,rmse_ratio,rmse_ratio_low,rmse_ratio_high,promised,promised_low,promised_high,\
-             pixels_that_differ,pixels_that_jump,largest_difference_over_mean,rms_difference_over_rmse,verdict\n";
+             excess,excess_low,excess_high,pixels_that_differ,pixels_that_jump,largest_difference_over_mean,rms_difference_over_mean,verdict\n";
     let stretch = Stretch::of(summary);
     for subject in &summary.stability {
+        let judged = |against: Option<Against>| {
+            let verdict = against.map_or(Verdict::CannotTell, |against| stretch.judge(&against)).word();
+            let of = |number: &dyn Fn(&Against) -> Estimate| against.as_ref().map(number);
+            ([of(&|a| a.ratio), of(&|a| a.promised), of(&|a| stretch.stretched(a))], verdict)
+        };
         for cell in &subject.counts {
-            let against = count_against(summary, subject, cell);
-            let verdict = against.map_or(Verdict::CannotTell, |against| stretch.judge(&against.excess)).word();
-            let numbers = (against.map(|against| against.ratio), against.map(|against| against.promised));
+            let (numbers, verdict) = judged(count_against(summary, subject, cell));
             text += &csv_line(summary, subject, cell, Variant::Plain, numbers, verdict);
         }
         for (variant, cell) in &subject.remade {
             let (numbers, verdict) = match variant {
-                Variant::TwoPasses => {
-                    let against = passes_against(summary, subject, cell);
-                    let verdict = against.map_or(Verdict::CannotTell, |against| stretch.judge(&against.excess)).word();
-                    ((against.map(|against| against.ratio), against.map(|against| against.promised)), verdict)
-                }
-                _ => ((remade_ratio(&subject.base, cell), None), scale_verdict(&subject.base, cell).word()),
+                Variant::TwoPasses => judged(passes_against(summary, subject, cell)),
+                _ => ([scaled_ratio(&subject.base, cell), None, None], scale_verdict(&subject.base, cell).word()),
             };
             text += &csv_line(summary, subject, cell, *variant, numbers, verdict);
         }
@@ -307,7 +431,7 @@ fn csv_line(
     subject: &Subject,
     cell: &Cell,
     variant: Variant,
-    (ratio, promised): (Option<Estimate>, Option<Estimate>),
+    numbers: [Option<Estimate>; 3],
     verdict: &str,
 ) -> String {
     let (scene, sampler) = (&summary.scenes[subject.scene], &summary.samplers[subject.sampler]);
@@ -322,8 +446,9 @@ fn csv_line(
         cell.spp.taken.to_string(),
     ]
     .join(",");
-    line += &estimate_fields(ratio.map(six_digits));
-    line += &estimate_fields(promised.map(six_digits));
+    for number in numbers {
+        line += &estimate_fields(number.map(six_digits));
+    }
     let d = differences(&subject.base, &cell.twins);
     for number in [d.map(|d| d.differing), d.map(|d| d.jumping), d.map(|d| d.largest), d.and_then(|d| d.rms)] {
         line += &format!(",{}", number.map(|number| number.to_string()).unwrap_or_default());
@@ -345,30 +470,111 @@ mod tests {
         Estimate { value, ci95: Some([low, high]) }
     }
 
-    #[test]
-    fn a_verdict_asks_for_the_stretched_interval() {
-        let plain = Stretch { comparisons: 1, factor: 1.0 };
-        let wide = Stretch { comparisons: 100, factor: 3.0 };
-        assert_eq!(plain.judge(&e(1.2, 1.1, 1.3)), Verdict::Worse);
-        assert_eq!(wide.judge(&e(1.2, 1.1, 1.3)), Verdict::CannotTell);
-        assert_eq!(wide.judge(&e(1.2, 1.15, 1.3)), Verdict::Worse);
-        assert_eq!(plain.judge(&e(1.0, 0.95, 1.06)), Verdict::Stable);
-        assert_eq!(wide.judge(&e(1.0, 0.95, 1.06)), Verdict::CannotTell);
-        assert_eq!(wide.judge(&e(0.7, 0.6, 0.8)), Verdict::Stable, "better is not unstable");
-        assert_eq!(wide.judge(&e(1.005, 1.005, 1.005)), Verdict::Stable, "exact, and less than a word is worth");
-        assert_eq!(wide.judge(&e(1.02, 1.02, 1.02)), Verdict::Worse, "exact");
-        assert_eq!(wide.judge(&Estimate::without_interval(2.0)), Verdict::CannotTell);
+    fn against(excess: Estimate, freedom: f64) -> Against {
+        Against { ratio: excess, promised: exactly(1.0), excess, freedom }
     }
 
-    /// P(at least 7 of 8 below the median) = 9/256 = 3.5 %; of 5 all: 1/32; of 4 all: 1/16, too much.
+    /// Student's quantiles with 7 degrees of freedom: 2.3646 at 97.5 %, 5.4079 at 99.95 % (tables), so a hundred comparisons
+    /// stretch by 2.287; with 2, 4.3027 and 31.599, by 7.34.
     #[test]
-    fn the_median_s_upper_ends_are_those_of_the_binomial_distribution() {
-        assert_eq!(
-            (1..=8).map(median_is_below).collect::<Vec<_>>(),
-            [None, None, None, None, Some(5), Some(6), Some(7), Some(7)]
-        );
-        // P(Bin(20, ½) ≥ 15) = 2.07 %, ≥ 14 is 5.77 %; for many, n/2 + 1.645 √n/2 by the normal law.
-        assert_eq!(median_is_below(20), Some(15));
-        assert!(median_is_below(10_000).is_some_and(|rank| rank.abs_diff(5083) <= 1));
+    fn a_verdict_asks_for_the_interval_stretched_at_its_own_degrees_of_freedom() {
+        let (plain, many) = (Stretch { comparisons: 1, freedom: 7.0 }, Stretch { comparisons: 50, freedom: 7.0 });
+        assert!((many.factor(7.0) - 5.4079 / 2.3646).abs() < 1e-3, "{}", many.factor(7.0));
+        assert!((many.factor(2.0) - 31.599 / 4.3027).abs() < 1e-2, "{}", many.factor(2.0));
+        let judge = |stretch: &Stretch, excess, freedom| stretch.judge(&against(excess, freedom));
+        assert_eq!(judge(&plain, e(1.2, 1.1, 1.3), 7.0), Verdict::Worse);
+        assert_eq!(judge(&many, e(1.2, 1.1, 1.3), 7.0), Verdict::CannotTell);
+        assert_eq!(judge(&many, e(1.2, 1.15, 1.3), 7.0), Verdict::Worse);
+        assert_eq!(judge(&many, e(1.2, 1.15, 1.3), 2.0), Verdict::CannotTell, "a line through four points");
+        assert_eq!(judge(&plain, e(1.0, 0.95, 1.06), 7.0), Verdict::Stable);
+        assert_eq!(judge(&many, e(1.0, 0.95, 1.06), 7.0), Verdict::CannotTell);
+        assert_eq!(judge(&many, e(0.7, 0.6, 0.8), 7.0), Verdict::Stable, "better is not unstable");
+        assert_eq!(judge(&many, e(1.005, 1.005, 1.005), 7.0), Verdict::Stable, "exact, and less than a word is worth");
+        assert_eq!(judge(&many, e(1.02, 1.02, 1.02), 7.0), Verdict::Worse, "exact");
+        assert_eq!(judge(&many, Estimate::without_interval(2.0), 7.0), Verdict::CannotTell);
+        let shown = many.stretched(&against(e(1.2, 1.1, 1.3), 7.0)).ci95.unwrap();
+        assert!((shown[0] - 1.2 * libm::pow(1.1 / 1.2, many.factor(7.0))).abs() < 1e-12);
+    }
+
+    /// A cell that is found twice has one noise: R³ has three times the relative interval of R, not √5 of it.
+    #[test]
+    fn in_a_product_of_powers_distances_add_in_squares_and_a_cell_counts_once() {
+        let (a, b) = (cell("a", 64, e(4.0, 1.0, 16.0)), cell("b", 16, e(16.0, 16.0, 64.0)));
+        let ends = |factors: &[(&Cell, f64)]| power_product(factors).map(|e| (e.value, e.ci95.unwrap()));
+        let near = |found: Option<(f64, [f64; 2])>, value: f64, [low, high]: [f64; 2]| {
+            let (v, [l, h]) = found.unwrap();
+            assert!([(v, value), (l, low), (h, high)].iter().all(|(x, y)| (x / y - 1.0).abs() < 1e-12), "{v} {l} {h}");
+        };
+        near(ends(&[(&a, 1.0)]), 2.0, [1.0, 4.0]);
+        near(ends(&[(&a, 1.0), (&a, 2.0)]), 8.0, [1.0, 64.0]);
+        near(ends(&[(&a, 1.0), (&a, -1.0)]), 1.0, [1.0, 1.0]);
+        // ln 2 of each side of a, ln 2 of b's upper end, which is the lower end of 1/b.
+        let down = libm::exp(-(2.0f64.sqrt()) * std::f64::consts::LN_2);
+        near(ends(&[(&a, 1.0), (&b, -1.0)]), 0.5, [0.5 * down, 1.0]);
+        assert_eq!(power_product(&[(&cell("c", 4, e(-1.0, -2.0, 1.0)), 1.0)]), None);
+    }
+
+    fn cell(id: &str, spp: u32, mse: Estimate) -> Cell {
+        Cell {
+            scene: 0,
+            sampler: 0,
+            id: id.to_owned(),
+            spp: crate::experiment::results::Count { asked: spp, taken: spp },
+            replicates: 8,
+            is_fixed: false,
+            is_reference_limited: false,
+            mse,
+            rmse: None,
+            rel_mse: mse,
+            bias2: mse,
+            variance: None,
+            bias: mse,
+            error_autocorrelation: None,
+            replicate_mse: Vec::new(),
+            replicate_mean: vec![2.0; 8],
+            pixels: Vec::new(),
+            twins: Vec::new(),
+        }
+    }
+
+    /// χ² with 7 degrees of freedom: 16.0128 and 1.6899 at the upper 2.5 % and 97.5 % (tables). A range of the same values grows
+    /// with their number; their variation does not.
+    #[test]
+    fn a_spread_is_judged_by_its_variation_whatever_the_number_of_replicates() {
+        assert!((chi2_quantile(0.025, 7.0) - 16.0128).abs() < 1e-4);
+        assert!((chi2_quantile(0.975, 7.0) - 1.68987).abs() < 1e-5);
+        let of = |replicates: usize, half: f64| {
+            let rmse = |i: usize| 1.0 + if i.is_multiple_of(2) { half } else { -half };
+            let replicate_mse = (0..replicates).map(|i| rmse(i) * rmse(i)).collect();
+            spread(&Cell { replicate_mse, ..cell("a", 64, e(1.0, 0.9, 1.1)) }).unwrap()
+        };
+        assert_eq!(of(8, 0.04).verdict, SpreadVerdict::Narrow);
+        assert_eq!(of(8, 0.08).verdict, SpreadVerdict::CannotTell);
+        assert_eq!(of(8, 0.2).verdict, SpreadVerdict::Wide);
+        assert_eq!(of(400, 0.08).verdict, SpreadVerdict::Narrow, "more replicates say what eight could not");
+        let [low, high] = of(8, 0.04).variation.ci95.unwrap();
+        let value = of(8, 0.04).variation.value;
+        assert!((low / value - (7.0 / 16.0128f64).sqrt()).abs() < 1e-4 && (high / value - 2.0353).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_budget_of_roundings_does_not_grow_with_the_sampler_s_noise() {
+        let twin = TwinDifference { id: String::new(), differing: 0.9, jumping: 0.0, largest: 0.1, rms: 0.05 };
+        let verdict = |mse: f64, twin: TwinDifference| {
+            let made = Cell { replicates: 1, twins: vec![twin], ..cell("b", 64, e(mse, mse, mse)) };
+            scale_verdict(&cell("a", 64, e(mse, mse, mse)), &made)
+        };
+        // 0.05 of a mean of 2 is 2.5 %.
+        assert_eq!(verdict(1e-6, twin.clone()), ScaleVerdict::Changed);
+        assert_eq!(verdict(1e6, twin.clone()), ScaleVerdict::Changed);
+        assert_eq!(verdict(1e-6, TwinDifference { rms: 0.039, ..twin }), ScaleVerdict::Unchanged);
+    }
+
+    #[test]
+    fn one_image_each_in_another_unit_of_length_has_no_interval_unless_it_is_exact() {
+        let single = |mse| Cell { replicates: 1, is_fixed: true, ..cell("a", 64, mse) };
+        let (noisy, exact) = (single(e(1.0, 0.9, 1.1)), single(e(1.0, 1.0, 1.0)));
+        assert_eq!(scaled_ratio(&noisy, &noisy).unwrap().ci95, None);
+        assert_eq!(scaled_ratio(&exact, &exact).unwrap().ci95, Some([1.0, 1.0]));
     }
 }

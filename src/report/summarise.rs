@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 use crate::experiment::results::{
     About, Count, EnsembleRow, Estimator, ImageRow, Kind, PointsRow, ReferenceRow, Row, SceneFacts, Stage, Timing,
-    TwinDifference, Variant,
+    TwinDifference, Variant, is_enough,
 };
 use crate::experiment::spec::{Experiment, Pictures, SamplerEntry};
 use crate::sampling::{Decision, Order, Points, Preset, Random, SamplerSet, SamplerSpec, Scope};
@@ -25,6 +25,10 @@ pub const SLOPE_COUNTS: std::ops::RangeInclusive<u32> = 4..=256;
 
 /// Smallest set that a slope of the star discrepancy is fitted over.
 pub const SLOPE_POINTS: u32 = 16;
+
+/// The share of an RMSE that the reference's own may be, where the experiment states none: beyond it the error is
+/// reference-limited. At half, a plain comparison with the reference would show a mean square error 25 % too large.
+pub const REFERENCE_SHARE: f64 = 0.5;
 
 /// Everything that a report says, as numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -163,6 +167,8 @@ pub struct Cell {
     pub replicates: u32,
     /// Whether one replicate is all there is, so that the error has no variance.
     pub is_fixed: bool,
+    /// Whether the reference's own RMSE is more than [`Summary::reference_share`] of this one.
+    pub is_reference_limited: bool,
     /// Unbiased mean square error.
     pub mse: Estimate,
     /// Its root; `None` where the estimate of the square is below 0.
@@ -201,7 +207,7 @@ pub struct Slope {
     pub scene: usize,
     /// Index of the sampler.
     pub sampler: usize,
-    /// Counts that were fitted over.
+    /// Counts that were fitted over: none that is reference-limited.
     pub counts: Vec<u32>,
     /// The fit; `None` where fewer than two counts have an error above 0.
     pub fit: Option<SlopeFit>,
@@ -245,6 +251,11 @@ impl Summary {
     /// The cell of a scene, a sampler and a count asked for.
     pub fn cell(&self, scene: usize, sampler: usize, asked: u32) -> Option<&Cell> {
         self.cells.iter().find(|c| c.scene == scene && c.sampler == sampler && c.spp.asked == asked)
+    }
+
+    /// The share of an RMSE that the reference's own may be: the experiment's, else [`REFERENCE_SHARE`].
+    pub fn reference_share(&self) -> f64 {
+        reference_share(&self.about.experiment)
     }
 
     /// The cells of a scene and a sampler by ascending count.
@@ -390,7 +401,7 @@ fn course(from: &Cell, to: &Cell) -> Option<Course> {
 /// Of rows that stand for the same thing the last one counts. Timings are kept apart: nothing but
 /// [`Summary::speeds`] comes from them.
 pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
-    let index = Index::new(rows, about.experiment.estimator.primary());
+    let index = Index::new(rows, &about.experiment);
     let samplers = samplers(&about.experiment);
     let mut summary = Summary {
         about: about.clone(),
@@ -415,6 +426,10 @@ pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
     index.add_pictures(&mut summary, timings);
     index.add_speeds(&mut summary, timings);
     summary
+}
+
+fn reference_share(experiment: &Experiment) -> f64 {
+    experiment.reference.noise.unwrap_or(REFERENCE_SHARE)
 }
 
 /// What the plan left out, by index.
@@ -482,18 +497,21 @@ struct Index<'a> {
     ensembles: HashMap<EnsembleKey<'a>, &'a EnsembleRow>,
     /// The estimator that samplers are compared with.
     primary: Estimator,
+    /// [`Summary::reference_share`].
+    share: f64,
     points: HashMap<(&'a str, u32), Vec<&'a PointsRow>>,
     pictures: Vec<&'a ImageRow>,
     stages: Vec<&'a ImageRow>,
 }
 
 impl<'a> Index<'a> {
-    fn new(rows: &'a [Row], primary: Estimator) -> Self {
+    fn new(rows: &'a [Row], experiment: &Experiment) -> Self {
         let mut index = Self {
             images: HashMap::new(),
             references: HashMap::new(),
             ensembles: HashMap::new(),
-            primary,
+            primary: experiment.estimator.primary(),
+            share: reference_share(experiment),
             points: HashMap::new(),
             pictures: Vec::new(),
             stages: Vec::new(),
@@ -599,6 +617,7 @@ impl<'a> Index<'a> {
             row.members.iter().filter_map(|id| self.images.get(id.as_str()).copied()).collect();
         let is_fixed = row.replicates == 1 && is_fixed(p, s);
         let is_exact = is_fixed && s.has_closed_form;
+        let noise = s.reference.as_ref().map(|reference| reference.noise_mse);
         // A single image of a random sampler: the row's interval holds the reference's noise alone, not its own.
         let known = |e: Estimate| match (row.replicates, is_exact) {
             (1, true) => Estimate { ci95: e.ci95.or(Some([e.value; 2])), ..e },
@@ -612,6 +631,7 @@ impl<'a> Index<'a> {
             spp: row.spp,
             replicates: row.replicates,
             is_fixed,
+            is_reference_limited: noise.is_some_and(|noise| !is_enough(noise, row.mse.value, self.share)),
             mse: known(row.mse),
             rmse: row.rmse.map(known),
             rel_mse: known(row.rel_mse),
@@ -757,6 +777,7 @@ fn add_slopes(summary: &mut Summary) {
                 SLOPE_COUNTS.contains(&cell.spp.asked)
                     && cell.spp.asked.is_power_of_two()
                     && cell.spp.taken == cell.spp.asked
+                    && !cell.is_reference_limited
                     && cell.replicate_mse.len() == cell.replicates as usize
             };
             let cells: Vec<&Cell> = cells.iter().filter(is_usable).copied().collect();

@@ -15,7 +15,7 @@ pub fn summary_csv(summary: &Summary) -> String {
     for metric in ["rmse", "mse", "rel_mse", "bias2", "variance", "bias", "error_autocorrelation"] {
         let _ = write!(text, ",{metric},{metric}_low,{metric}_high");
     }
-    text += ",reference_noise_mse\n";
+    text += ",reference_noise_mse,reference_limited\n";
     for cell in &summary.cells {
         text += &cell_line(summary, cell);
     }
@@ -48,7 +48,7 @@ fn cell_line(summary: &Summary, cell: &Cell) -> String {
         line += &estimate_fields(estimate);
     }
     let noise = scene.reference.as_ref().map(|reference| reference.noise_mse.to_string());
-    let _ = writeln!(line, ",{}", noise.unwrap_or_default());
+    let _ = writeln!(line, ",{},{}", noise.unwrap_or_default(), cell.is_reference_limited);
     line
 }
 

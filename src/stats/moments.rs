@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::special::student_two_sided_inverse;
+use super::special::{incomplete_gamma_upper, solve_falling, student_two_sided_inverse};
 
 /// A number with its 95 % confidence interval.
 ///
@@ -146,6 +146,25 @@ pub(super) fn two_sided_factor(confidence: f64, df: f64) -> f64 {
     student_two_sided_inverse(1.0 - confidence, df)
 }
 
+/// Interval of a variance σ² of normal numbers that was estimated as `variance` with `freedom` > 0 degrees of freedom (not
+/// necessarily whole): [variance ν/χ²_hi, variance ν/χ²_lo], with equal tails outside.
+///
+/// Quantiles of χ² by bisection on the incomplete gamma integral. `confidence` is the two-sided level in (0, 1).
+pub fn variance_interval(variance: f64, freedom: f64, confidence: f64) -> [f64; 2] {
+    let tail = 0.5 * (1.0 - confidence);
+    [tail, 1.0 - tail].map(|upper| variance * (freedom / chi2_quantile(upper, freedom)))
+}
+
+/// The x with P(χ² > x) = `upper`.
+fn chi2_quantile(upper: f64, freedom: f64) -> f64 {
+    let tail = |x: f64| incomplete_gamma_upper(0.5 * freedom, 0.5 * x);
+    let mut high = freedom;
+    while tail(high) > upper {
+        high *= 2.0;
+    }
+    solve_falling(tail, upper, 0.0, high)
+}
+
 /// Mean of independent values with its Student-t interval: mean ± t_{n−1} s/√n.
 ///
 /// `confidence` is the two-sided level in (0, 1); whatever is recorded uses 0.95, hence the field's name. One value
@@ -286,6 +305,18 @@ mod tests {
             let other = merged(&order);
             let (a, b) = (first.variance().unwrap_or(0.0), other.variance().unwrap_or(1.0));
             assert!(first.n == other.n && (first.mean - other.mean).abs() < 1e-12 && (a / b - 1.0).abs() < 1e-13);
+        }
+    }
+
+    /// Put back into the χ² distribution of statrs, the ends leave 2.5 % outside on either side; statrs is good to 1e-11.
+    #[test]
+    fn the_interval_of_a_variance_leaves_equal_tails_outside() {
+        use statrs::distribution::{ChiSquared, ContinuousCDF};
+        for freedom in [0.5, 1.0, 3.0, 31.0, 346.2, 1e5] {
+            let [low, high] = variance_interval(2.0, freedom, 0.95);
+            assert!(low < 2.0 && 2.0 < high);
+            let cdf = |end: f64| ChiSquared::new(freedom).unwrap().cdf(2.0 * freedom / end);
+            assert!((cdf(low) - 0.975).abs() < 1e-9 && (cdf(high) - 0.025).abs() < 1e-9, "{freedom}: {low} {high}");
         }
     }
 }

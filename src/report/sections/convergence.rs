@@ -7,6 +7,7 @@ use super::super::markdown::{Page, link_to, table_ref};
 use super::super::numbers::{counted, estimate, listed, percent, short, slope_text, with_interval};
 use super::super::summarise::{SLOPE_COUNTS, Slope, Summary};
 use super::super::write::Figures;
+use super::reference;
 use super::words::{estimate_cell, level, name, replicates, row, same_as_cell, scene_name};
 use super::{show, tabulate, tabulate_folded, titles};
 
@@ -44,9 +45,10 @@ fn slope_estimate(fit: &crate::stats::SlopeFit) -> Estimate {
 pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
     page.heading(2, titles::CONVERGENCE);
     let caption = format!(
-        "RMSE in W/(m² sr) against samples per pixel taken, a panel a scene; {} with 95 % bands; thin lines: slopes −1/2 and −1; dotted: the reference's own noise. \
+        "RMSE in W/(m² sr) against samples per pixel taken, a panel a scene; {} with 95 % bands; thin lines: slopes −1/2 and −1; dotted: the reference's own noise{}. \
          The numbers are in {}.",
         counted(summary.about.experiment.replicates as usize, "replicate", "replicates"),
+        if reference::mark_words(summary).is_some() { "; pale markers: reference-limited" } else { "" },
         table_ref("rmse")
     );
     show(page, figures, "convergence", true, &caption);
@@ -82,6 +84,9 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
         counted(summary.about.experiment.replicates as usize, "replicate", "replicates")
     );
     tabulate_folded(page, "rmse", "RMSE at every count", &caption, &head, &lines);
+    if let Some(words) = reference::mark_words(summary) {
+        page.paragraph(&words);
+    }
 }
 
 /// Which slopes are told apart from −1/2.
@@ -129,8 +134,8 @@ fn rmse_table(summary: &Summary) -> (Vec<Vec<String>>, Vec<String>) {
             let cells = spp.iter().map(|&n| {
                 let cell = summary.cell(scene, sampler, n);
                 cell.map_or("missing".to_owned(), |cell| match cell.rmse {
-                    Some(rmse) => short(rmse.value),
-                    None => "below noise".to_owned(),
+                    Some(rmse) => format!("{}{}", short(rmse.value), reference::mark(cell)),
+                    None => format!("below noise{}", reference::mark(cell)),
                 })
             });
             [scene_name(summary, scene), name(summary, sampler)].into_iter().chain(cells).collect()
@@ -161,7 +166,7 @@ pub fn bias_and_variance(summary: &Summary, figures: &Figures, page: &mut Page) 
                 name(summary, sampler),
                 estimate(&cell.bias2),
                 variance,
-                estimate(&cell.mse),
+                format!("{}{}", estimate(&cell.mse), reference::mark(cell)),
                 cell.bias_share().map_or("–".to_owned(), percent),
                 replicates(cell),
                 row(&cell.id),

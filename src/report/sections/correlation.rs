@@ -9,9 +9,10 @@ use super::super::numbers::{estimate, listed, percent, short, signed, signed_est
 use super::super::pairing;
 use super::super::shots::{PictureSet, Shot};
 use super::super::summarise::{Cell, Summary};
+use super::reference;
 use super::words::{
-    against_one, bias_short, bias_words, estimate_cell, level, limit_words, name, ratio_cell, rmse_ratio, row, rows,
-    scene_name, scenes_by_lens, times,
+    against_one, bias_short, bias_words, estimate_cell, level, limit_words, marked_row, name, ratio_cell, rmse_ratio,
+    row, rows, scene_name, scenes_by_lens, times,
 };
 use super::{tabulate, tabulate_folded, titles};
 
@@ -200,7 +201,7 @@ fn course_row(summary: &Summary, scene: usize, sampler: usize, from: u32, to: u3
         estimate(&high.bias2),
         high.bias_share().map_or("–".to_owned(), percent),
         if high.is_fixed { "nothing random".to_owned() } else { ratio_cell(variance) },
-        course.map_or("cannot tell", |course| limit_words(&course)).to_owned(),
+        format!("{}{}", course.map_or("cannot tell", |course| limit_words(&course)), reference::mark(high)),
         row(&high.id),
     ])
 }
@@ -474,7 +475,7 @@ fn neighbours_table(summary: &Summary, spp: u32, page: &mut Page) {
                 cell.error_autocorrelation.map_or("–".to_owned(), |rho| signed_estimate(&rho)),
                 estimate_cell(cell.rmse),
                 spread(&cell.replicate_mean).map_or("–".to_owned(), short),
-                row(&cell.id),
+                marked_row(cell),
             ])
         })
         .collect();

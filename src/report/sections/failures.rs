@@ -6,14 +6,14 @@ use super::super::evidence::{
     Answer, Limit, clearly_above_one, clearly_below_one, interpolated, is_biased, ratio_of_roots,
 };
 use super::super::markdown::{Page, link_to};
-use super::super::numbers::{counted, estimate, listed, percent, short, signed_estimate};
+use super::super::numbers::{counted, estimate, percent, signed_estimate};
 use super::super::summarise::{Cell, Step, Summary};
 use super::correlation::{Structure, pattern_spp, structure};
 use super::speed::efficiency;
 use super::words::{
-    bias_words, level, limit_words, name, ratio_cell, rmse_ratio, row, same_as_cell, scene_name, times,
+    bias_words, level, limit_words, marked_row, name, ratio_cell, rmse_ratio, same_as_cell, scene_name, times,
 };
-use super::{tabulate, titles};
+use super::{reference, tabulate, titles};
 
 /// An error at a count that is no power of two, over what its neighbours promise.
 pub struct OddCount {
@@ -80,7 +80,7 @@ fn course_failure(summary: &Summary, scene: usize, sampler: usize) -> Option<Vec
             name(summary, sampler),
             scene_name(summary, scene),
             format!("RMSE {to} / {from} spp = {}; {}", times(&course.rmse_ratio), bias_words(cell, mean)),
-            row(&cell.id),
+            marked_row(cell),
         ]
     })
 }
@@ -98,7 +98,7 @@ fn structure_failure(summary: &Summary, scene: usize, sampler: usize, found: &St
         name(summary, sampler),
         scene_name(summary, scene),
         format!("ρ = {rho} at {} spp", found.cell.spp.asked),
-        row(&found.cell.id),
+        marked_row(found.cell),
     ]
 }
 
@@ -114,7 +114,7 @@ fn odd_failure(summary: &Summary, scene: usize, sampler: usize) -> Option<Vec<St
             odd.taken,
             times(&odd.ratio)
         ),
-        row(&cell.id),
+        marked_row(cell),
     ])
 }
 
@@ -174,7 +174,7 @@ fn right_image(summary: &Summary, scene: usize, sampler: usize, to: u32) -> Stri
         (Limit::Falls, Answer::Yes) => "its error falls, but it is biased".to_owned(),
         _ => "cannot tell".to_owned(),
     };
-    format!("{word} ({})", estimate(&cell.bias2))
+    format!("{word} ({}){}", estimate(&cell.bias2), reference::mark(cell))
 }
 
 /// What can be said of an error that falls without a bias that is seen: how large one could be, whether the construction
@@ -194,7 +194,8 @@ fn against_uniform(summary: &Summary, scene: usize, sampler: usize, uniform: usi
         return "1".to_owned();
     }
     let cells = summary.cell(scene, sampler, spp).zip(summary.cell(scene, uniform, spp));
-    ratio_cell(cells.and_then(|(own, base)| rmse_ratio(own, base)))
+    let mark = cells.map_or("", |(own, _)| reference::mark(own));
+    format!("{}{mark}", ratio_cell(cells.and_then(|(own, base)| rmse_ratio(own, base))))
 }
 
 /// What is one number a sampler: counts between powers of two, randomness, neighbours, efficiency.
@@ -263,9 +264,7 @@ pub fn limits(summary: &Summary, page: &mut Page) {
     page.heading(2, titles::LIMITS);
     let e = &summary.about.experiment;
     let mut items = Vec::new();
-    for (i, scene) in summary.scenes.iter().enumerate() {
-        items.extend(reference_limit(summary, i, scene.reference_rmse()));
-    }
+    items.extend((0..summary.scenes.len()).filter_map(|scene| reference::limit(summary, scene)));
     items.push(match e.replicates {
         1 => "One replicate: no variance, and no interval that holds a sampler's own randomness.".to_owned(),
         n => format!(
@@ -295,33 +294,6 @@ pub fn limits(summary: &Summary, page: &mut Page) {
     page.bullets(&items);
 }
 
-/// How near the errors come to the reference's own.
-fn reference_limit(summary: &Summary, scene: usize, noise: Option<f64>) -> Option<String> {
-    let noise = noise?;
-    let at = scene_name(summary, scene);
-    if noise == 0.0 {
-        return Some(format!("{at}: the reference is exact."));
-    }
-    let cells = summary.cells.iter().filter(|cell| cell.scene == scene);
-    let least = cells.filter_map(|cell| cell.rmse.map(|rmse| (rmse.value, cell))).min_by(|a, b| a.0.total_cmp(&b.0));
-    let below: Vec<String> = summary
-        .cells
-        .iter()
-        .filter(|cell| cell.scene == scene && cell.rmse.is_none())
-        .map(|cell| format!("{} at {} spp", name(summary, cell.sampler), cell.spp.asked))
-        .collect();
-    let least = least.map(|(rmse, cell)| {
-        format!(
-            "; the smallest RMSE measured is {} ({} times it, row {})",
-            short(rmse),
-            short(rmse / noise),
-            row(&cell.id)
-        )
-    });
-    let below = if below.is_empty() { String::new() } else { format!("; below noise: {}", listed(&below)) };
-    Some(format!("{at}: the reference's own RMSE is {}{}{below}.", short(noise), least.unwrap_or_default()))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -336,6 +308,7 @@ mod tests {
             spp: Count { asked: 256, taken: 256 },
             replicates: 8,
             is_fixed: false,
+            is_reference_limited: false,
             mse: Estimate::without_interval(1.0),
             rmse: None,
             rel_mse: none,

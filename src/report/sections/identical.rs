@@ -10,7 +10,7 @@ use super::super::evidence::Limit;
 use super::super::markdown::{Page, link_to};
 use super::super::numbers::{counted, listed, signed_estimate};
 use super::super::summarise::{Cell, Summary};
-use super::words::{level, main_scene, name, row, scene_name};
+use super::words::{level, main_scene, marked_row, name, scene_name};
 use super::{tabulate_folded, titles};
 
 /// Means count as equal in practice within this share of the mean radiance.
@@ -141,7 +141,7 @@ fn means(summary: &Summary, scene: usize, most: u32) -> Vec<Vec<String>> {
             bias.map_or("–".to_owned(), percent),
             bias.map_or("cannot tell", |bias| equivalent(&bias)).to_owned(),
             p.map_or("–".to_owned(), |p| if *p < 0.001 { "< 0.001".into() } else { format!("{p:.3}") }),
-            row(&cell.id),
+            marked_row(cell),
         ]
     };
     cells.iter().map(line).collect()

@@ -25,6 +25,7 @@ mod identical;
 mod opening;
 mod pictures;
 mod points;
+mod reference;
 mod scenes;
 mod shortcut;
 mod speed;

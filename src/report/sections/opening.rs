@@ -8,7 +8,7 @@ use super::super::numbers::{counted, listed, short};
 use super::super::provenance;
 use super::super::summarise::{SLOPE_COUNTS, Summary};
 use super::words::name;
-use super::{scenes, tabulate, tabulate_folded, titles};
+use super::{reference, scenes, tabulate, tabulate_folded, titles};
 
 /// Title, provenance, and what is missing.
 pub fn title(summary: &Summary, page: &mut Page) {
@@ -40,10 +40,7 @@ pub fn what_was_run(summary: &Summary, page: &mut Page) {
             counted(e.replicates as usize, "replicate", "replicates"),
             estimator_words(e.estimator)
         ),
-        format!(
-            "References: two independent halves of {} spp by `{}`, which is not compared; a closed form where the scene has one.",
-            e.reference.spp, e.reference.sampler
-        ),
+        reference::what_words(summary),
     ];
     if let Some(points) = &e.points {
         let (low, high) = (points.n.iter().min().copied().unwrap_or(0), points.n.iter().max().copied().unwrap_or(0));
@@ -118,6 +115,7 @@ pub fn how_to_read(summary: &Summary, page: &mut Page) {
          order. `:best` keeps the decisions apart. Correlation ρ between neighbouring pixels' errors: 0 for independent unbiased pixels, above 0 where an error is shared (one pattern in all pixels, or a bias that varies slowly over the picture), 1 where \
          all err alike."
             .to_owned(),
+        reference::share_words(summary),
         format!("Seeds of all randomisations are derived from {} and stand in the rows.", e.seed),
     ]);
 }
@@ -129,23 +127,22 @@ pub fn scenes_and_samplers(summary: &Summary, page: &mut Page) {
     let rows: Vec<Vec<String>> = summary
         .scenes
         .iter()
-        .map(|scene| {
+        .enumerate()
+        .map(|(i, scene)| {
             let reference = scene.reference.as_ref();
-            vec![
+            let mut line = vec![
                 format!("`{}`", scene.name),
                 scene.size.to_string(),
                 reference.map_or("missing".to_owned(), |r| short(r.mean)),
-                match reference {
-                    None => "missing".to_owned(),
-                    Some(r) if r.halves.is_none() => "closed form, none".to_owned(),
-                    Some(r) => short(r.noise_mse.max(0.0).sqrt()),
-                },
-            ]
+            ];
+            line.extend(reference::cells(summary, i));
+            line
         })
         .collect();
-    let head = ["scene", "pixels", "mean radiance", "reference's RMSE"];
-    let caption = "Scenes: size of the compared images in pixels, mean radiance and the reference's own error (root mean \
-                   square, RMSE) in W/(m² sr).";
+    let mut head = vec!["scene", "pixels", "mean radiance"];
+    head.extend(reference::HEADS);
+    let caption = "Scenes: size of the compared images in pixels, mean radiance, what the reference is made of, its own error (root mean square, \
+                   RMSE), the smallest RMSE that it judges, and the first over the second; radiance in W/(m² sr).";
     tabulate(page, "scenes", caption, &head, &rows);
     let rows: Vec<Vec<String>> = (0..summary.samplers.len()).map(|i| sampler_row(summary, i)).collect();
     let caption = "Samplers: the full form of each name (points:order:randomisation@scope), whether another seed gives another set, and the samples per pixel that it takes \

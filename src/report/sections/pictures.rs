@@ -1,10 +1,12 @@
 //! Pictures: the four stages, strips with enlarged details at equal samples and at equal time, error maps.
 
+use crate::experiment::results::ImageRow;
+
 use super::super::charts::of_scene;
 use super::super::markdown::{Page, figure_ref, link_to, table_ref};
 use super::super::numbers::{counted, listed, percent, short, signed};
 use super::super::pictured::rmse_words;
-use super::super::shots::{EqualTime, OVER_BUDGET, PictureSet, Shot};
+use super::super::shots::{EqualTime, OVER_BUDGET, PictureSet, Shot, equal_time};
 use super::super::summarise::Summary;
 use super::super::write::{FigureState, Figures};
 use super::words::{name, row, scene_name};
@@ -24,13 +26,23 @@ pub fn stages(summary: &Summary, figures: &Figures, page: &mut Page) {
     let lights = if set.has_lights { ", sampled lights" } else { "" };
     let caption = format!(
         "{} in {number} stages, each with one decision more than the one before: pixel centres and albedo, a sampled pixel{lens}{lights}. \
-         {} pixels, exposure {} (brightness of the picture alone), rows {}.",
+         {}, {} pixels, exposure {} (brightness of the picture alone), rows {}.",
         scene_name(summary, set.scene),
+        made_by(&set.stages_shown()),
         set.pictures.size,
         set.exposure,
         listed(&rows)
     );
     show(page, figures, "stages", false, &caption);
+}
+
+/// Who made the stages and with how many samples: "by `uniform`, 1 and 26 spp".
+fn made_by(stages: &[&ImageRow]) -> String {
+    let mut samplers: Vec<String> = stages.iter().map(|stage| format!("`{}`", stage.sampler)).collect();
+    let mut counts: Vec<String> = stages.iter().map(|stage| stage.spp.taken.to_string()).collect();
+    samplers.dedup();
+    counts.dedup();
+    format!("By {}, {} spp", listed(&samplers), listed(&counts))
 }
 
 /// Equal samples and equal time side by side, scene by scene.
@@ -70,7 +82,10 @@ fn at_equal_samples(summary: &Summary, set: &PictureSet, figures: &Figures, page
     let frames = if words.is_some() { "; frames: the details enlarged below" } else { "" };
     let reference = match set.reference.as_ref().map(|row| row.halves.is_some()) {
         Some(false) => "a closed form".to_owned(),
-        _ => format!("the mean of two halves of {} spp", set.pictures.reference_spp),
+        made => {
+            let by = made.and(set.reference.as_ref()).map(|row| format!(" by `{}`", row.sampler)).unwrap_or_default();
+            format!("the mean of two halves of {} spp{by}", set.pictures.reference_spp)
+        }
     };
     let caption = format!(
         "The reference of the pictures of `{scene}`, {reference}, {size} pixels, exposure {}{frames}.",
@@ -126,23 +141,25 @@ fn at_equal_time(summary: &Summary, set: &PictureSet, figures: &Figures, page: &
     }
     let scene = &summary.scenes[set.scene].name;
     let Some(uniform) = summary.uniform() else { return };
-    let Some(found) = set.at_equal_time(uniform) else {
+    let Some(found) = equal_time(summary, set) else {
         return page.paragraph(&format!(
-            "Nothing is shown of `{scene}` at equal time: the picture of uniform sampling that sets the budget was not timed."
+            "Nothing is shown of `{scene}` at equal time: there are no seconds of uniform sampling at the count that sets the budget."
         ));
     };
     let (asked, figure) = (set.pictures.equal_spp(), of_scene("equal-time", scene));
     let counts: Vec<String> = set.pictures.spp.iter().map(u32::to_string).collect();
     let rule = format!(
-        "the budget is what {} takes at {asked} spp, {} s; of {} spp each sampler shows the count whose seconds come nearest, no more than {} above it",
+        "the budget is what {} takes at {asked} spp, {} s; of {} spp each sampler shows the count whose seconds come nearest, no more than {} above it (seconds: median of the replicates of {}, \
+         scaled by pixels, between their counts on a line of logarithms)",
         name(summary, uniform),
         short(found.budget),
         listed(&counts),
-        percent(OVER_BUDGET)
+        percent(OVER_BUDGET),
+        summary.scenes[set.scene].size
     );
     if is_known(figures, &figure) {
         let caption = format!(
-            "The same details of `{scene}` at equal time: {rule}. Under each detail its own RMSE, then samples, seconds (one timing of this machine) and RMSE \
+            "The same details of `{scene}` at equal time: {rule}. Under each detail its own RMSE, then samples, seconds and RMSE \
              of the whole picture; RMSE in W/(m² sr)."
         );
         show(page, figures, &figure, false, &caption);
@@ -162,8 +179,9 @@ fn at_equal_time(summary: &Summary, set: &PictureSet, figures: &Figures, page: &
             ]
         })
         .collect();
-    let caption =
-        format!("The pictures of `{scene}` at equal time: {rule}. RMSE in W/(m² sr); one image and one timing each.");
+    let caption = format!(
+        "The pictures of `{scene}` at equal time: {rule}. RMSE in W/(m² sr); one image each, timed on this machine."
+    );
     tabulate(page, &table, &caption, &["picture", "spp taken", "seconds", "seconds / budget", "RMSE", "row"], &lines);
     page.sentences(&[
         smaller_at_equal_time(set, uniform, &found, &table, &figure, is_known(figures, &figure)),
@@ -175,12 +193,12 @@ fn at_equal_time(summary: &Summary, set: &PictureSet, figures: &Figures, page: &
 /// Whether other work on the machine makes single timings a poor measure.
 fn load_words(found: &EqualTime) -> String {
     let Some(([low, high], threads)) = found.load() else { return String::new() };
-    // The threads at work make the load average their number; one more is somebody else's.
-    if high <= threads as f64 + 1.0 {
+    if !found.is_loaded() {
         return String::new();
     }
     format!(
-        "**The machine had other work**: its load average was {low:.1} to {high:.1} while these pictures used {}, so their seconds, and with them the counts chosen, are rough.",
+        "**The machine had other work**: its load average was {low:.1} to {high:.1} while these pictures used {}. Medians of replicates bear that better than single timings do, but are rough too, so who has the smaller error in equal time \
+         is not said here.",
         counted(threads, "thread", "threads")
     )
 }
@@ -194,6 +212,9 @@ fn smaller_at_equal_time(
     figure: &str,
     is_drawn: bool,
 ) -> String {
+    if found.is_loaded() {
+        return String::new();
+    }
     let mse = |shot: &Shot| shot.row.errors.as_ref().map(|errors| errors.mse_unbiased);
     let Some(base) = set.shot(uniform, set.pictures.equal_spp()).and_then(mse) else { return String::new() };
     let others: Vec<f64> =

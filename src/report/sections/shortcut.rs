@@ -7,6 +7,7 @@ use super::super::evidence::{Answer, Limit, clearly_above_one, is_biased, paired
 use super::super::markdown::Page;
 use super::super::numbers::{estimate, listed, percent};
 use super::super::summarise::{Cell, Summary};
+use super::reference;
 use super::words::{estimate_cell, level, limit_words, name, ratio_cell, row, rows, scene_name};
 use super::{tabulate, titles};
 
@@ -66,7 +67,11 @@ fn of_scene(summary: &Summary, scene: usize, page: &mut Page) {
             word.to_owned(),
             estimate(&cell.bias2),
             estimate_cell(cell.variance),
-            cell.rmse.map_or_else(|| "below noise".to_owned(), |rmse| estimate(&rmse)),
+            format!(
+                "{}{}",
+                cell.rmse.map_or_else(|| "below noise".to_owned(), |rmse| estimate(&rmse)),
+                reference::mark(cell)
+            ),
             cell.bias_share().map_or_else(|| "–".to_owned(), |share| percent(share.min(1.0))),
             brightness,
             row(&cell.id),

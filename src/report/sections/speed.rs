@@ -9,7 +9,7 @@ use super::super::numbers::{counted, estimate, listed};
 use super::super::pareto::pareto_front;
 use super::super::summarise::{Cell, Speed, Summary};
 use super::super::write::Figures;
-use super::words::{name, ratio_cell, row, scene_name};
+use super::words::{marked_row, name, ratio_cell, scene_name};
 use super::{budgets, show, tabulate_folded, titles};
 
 /// The section.
@@ -117,7 +117,7 @@ fn efficiency_table(summary: &Summary, scene: usize, page: &mut Page) {
                 estimate(&rate),
                 estimate(&efficiency),
                 if is_base { "1".to_owned() } else { ratio_cell(relative) },
-                row(&cell.id),
+                marked_row(cell),
             ]
         })
         .collect();

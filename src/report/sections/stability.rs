@@ -3,15 +3,16 @@
 
 use crate::experiment::results::{JUMP, Variant};
 
+use super::super::evidence::Limit;
 use super::super::markdown::Page;
 use super::super::numbers::{counted, listed, percent, short, with_interval};
 use super::super::stability::{
-    Against, Differences, FALSE_ALARM, JUMPING, LEAST, MARGIN, ROUNDING, ScaleVerdict, SpreadVerdict, Stretch, Verdict,
-    WIDE, count_against, differences, passes_against, remade_ratio, scale_verdict, spread,
+    Differences, FALSE_ALARM, JUMPING, LEAST, MARGIN, Promise, ROUNDING, ScaleVerdict, SpreadVerdict, Stretch, Verdict,
+    WIDE, count_against, differences, passes_against, promise, scale_verdict, scaled_ratio, spread,
 };
 use super::super::summarise::{Cell, Subject, Summary};
 use super::super::write::Figures;
-use super::words::{level, name, ratio_cell, rows, scene_name, times};
+use super::words::{level, limit_words, name, ratio_cell, rows, scene_name, times};
 use super::{show, tabulate, tabulate_folded, titles};
 
 /// The section, where the experiment asks for it.
@@ -24,19 +25,23 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
     }
     let stretch = Stretch::of(summary);
     page.paragraph(&format!(
-        "What should make no difference, held against {} spp. Intervals are 95 % ones; a verdict on an error asks for more: {} are judged below, and each \
-         interval is stretched by {} (on a logarithmic scale), so that all of them together call a difference that is not there with a chance of at most {}. \
+        "What should make no difference, held against {} spp. {} are judged below. A verdict asks for more than a 95 % interval: each is *stretched* (on a logarithmic scale) by Student's factor for \
+         all of them together, {} at {} degrees of freedom, so that a difference which is not there is called anywhere with a chance of at most {}. \
          *Worse*: above what is promised by more than {} with the whole stretched interval; *stable*: above it by at most {}, likewise; all else is *cannot tell*.",
         asked.spp,
         counted(stretch.comparisons, "ratio of errors", "ratios of errors"),
-        short(stretch.factor),
+        short(stretch.factor(stretch.freedom)),
+        stretch.freedom,
         percent(FALSE_ALARM),
         percent(LEAST - 1.0),
         percent(MARGIN - 1.0),
     ));
+    let scenes: Vec<String> = by_scene(summary).iter().map(|(scene, _)| scene_name(summary, *scene)).collect();
     let caption = format!(
-        "RMSE over what is promised of it (no unit), {}; dashed: as promised. Against one pass of {} spp, numbers in [stability.csv](stability.csv).",
-        level(summary),
+        "RMSE over what is promised of it (no unit), at other counts and in two passes, in {}; bars: stretched intervals, {}; dashed: as promised. Against one pass of {} spp, \
+         numbers in [stability.csv](stability.csv).",
+        listed(&scenes),
+        replicates_words(summary),
         asked.spp
     );
     show(page, figures, "stability", true, &caption);
@@ -46,10 +51,33 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
     passes(summary, &stretch, page);
 }
 
+/// `8 replicates (1 where nothing is random)`.
+fn replicates_words(summary: &Summary) -> String {
+    let fixed = if summary.stability.iter().any(|s| s.base.is_fixed) { " (1 where nothing is random)" } else { "" };
+    format!("{}{fixed}", counted(summary.about.experiment.replicates as usize, "replicate", "replicates"))
+}
+
+/// A sampler's name, and where its error does not fall as it should what it does instead: then the count matters little, and
+/// "stable" is no praise.
+fn name_and_limit(summary: &Summary, subject: &Subject) -> String {
+    let who = name(summary, subject.sampler);
+    let course = summary.course(subject.scene, subject.sampler);
+    match course.filter(|course| !matches!(course.limit(), Limit::Falls | Limit::Unclear)) {
+        Some(course) => format!("{who} (which {})", limit_words(&course)),
+        None => who,
+    }
+}
+
 /// The subjects scene by scene.
 fn by_scene(summary: &Summary) -> Vec<(usize, Vec<&Subject>)> {
     let of = |scene: usize| summary.stability.iter().filter(|subject| subject.scene == scene).collect::<Vec<_>>();
     (0..summary.scenes.len()).map(|scene| (scene, of(scene))).filter(|(_, subjects)| !subjects.is_empty()).collect()
+}
+
+/// Samplers under the words that fit them, an item a group: what [`told`] says where members have much to say.
+fn told_in_items(at: &str, groups: &[(String, Vec<String>)]) -> Vec<String> {
+    let groups = groups.iter().filter(|(_, members)| !members.is_empty());
+    groups.map(|(words, members)| format!("In {at}, {words}: {}.", listed(members))).collect()
 }
 
 /// Samplers under the words that fit them, as one sentence about a scene; words in the order in which they are given.
@@ -74,9 +102,10 @@ fn counts(summary: &Summary, stretch: &Stretch, page: &mut Page) {
     let Some(asked) = summary.about.experiment.stability.as_ref() else { return };
     page.heading(3, "A sample more or less");
     page.paragraph(&format!(
-        "RMSE over that at {} spp. Promised: for fewer or many more samples the power of the counts taken that the sampler's own slope says (−1/2 where none was \
-         fitted), with the slope's interval; that a sample more does no harm. Where a sampler takes another count than asked, it is judged by what it took.",
-        asked.spp
+        "RMSE over that at {} spp. {} Where a sampler takes another count than asked, it is judged by what it took. In each cell: the ratio with its 95 % interval; what is promised of it; the one over \
+         the other with its stretched interval, and the verdict that rests on it.",
+        asked.spp,
+        promise_words(summary)
     ));
     for (scene, subjects) in by_scene(summary) {
         let mut head = vec![format!("in {}", scene_name(summary, scene))];
@@ -85,26 +114,52 @@ fn counts(summary: &Summary, stretch: &Stretch, page: &mut Page) {
         let lines: Vec<Vec<String>> = subjects
             .iter()
             .map(|subject| {
-                let cells = subject.counts.iter().map(|cell| count_cell(summary, subject, cell));
+                let cells = subject.counts.iter().map(|cell| count_cell(summary, stretch, subject, cell));
                 let verdict = count_words(summary, stretch, subject);
-                std::iter::once(name(summary, subject.sampler)).chain(cells).chain([verdict]).collect()
+                std::iter::once(name_and_limit(summary, subject)).chain(cells).chain([verdict]).collect()
             })
             .collect();
         let at = scene_name(summary, scene);
         let caption = format!(
-            "RMSE over that at {} spp in {at} (no unit), and what is promised of it; {}.",
+            "RMSE over that at {} spp in {at} (no unit), what is promised of it, and the one over the other with its stretched interval; {}.",
             asked.spp,
             level(summary)
         );
         tabulate(page, &format!("counts-{}", summary.scenes[scene].name), &caption, &head, &lines);
-        page.paragraph(&count_sentence(summary, stretch, scene, &subjects));
+        page.bullets(&count_sentences(summary, stretch, scene, &subjects));
     }
 }
 
-fn count_cell(summary: &Summary, subject: &Subject, cell: &Cell) -> String {
+/// Which promises there are, each where any count rests on it.
+fn promise_words(summary: &Summary) -> String {
+    let all = || summary.stability.iter().flat_map(|s| s.counts.iter().map(move |cell| promise(summary, s, cell)));
+    let by_neighbours = all().any(|promise| matches!(promise, Promise::Neighbours(..)));
+    let is_there = |what: Promise| all().any(|promise| promise == what);
+    let mut rules = Vec::new();
+    if by_neighbours {
+        rules.push(
+            "a count between two that were compared (powers of two, and the base) is promised what a straight line of logarithms between these two says",
+        );
+    }
+    if is_there(Promise::NoHarm) {
+        rules.push("that a sample more does no harm, where no larger count was compared");
+    }
+    if is_there(Promise::Slope) {
+        rules.push("a count outside the compared ones is promised the power of the counts that the sampler's own slope says (−1/2 where none was fitted)");
+    }
+    format!("Promised: {}.", rules.join("; "))
+}
+
+fn count_cell(summary: &Summary, stretch: &Stretch, subject: &Subject, cell: &Cell) -> String {
     let text = match count_against(summary, subject, cell) {
         None => "below noise".to_owned(),
-        Some(Against { ratio, promised, .. }) => format!("{} (promised {})", times(&ratio), short(promised.value)),
+        Some(against) => format!(
+            "{}, promised {}: {} {}",
+            times(&against.ratio),
+            short(against.promised.value),
+            times(&stretch.stretched(&against)),
+            stretch.judge(&against).word()
+        ),
     };
     let base = subject.base.spp;
     let other = |cell: &Cell| cell.spp.taken != cell.spp.asked;
@@ -117,7 +172,7 @@ fn count_cell(summary: &Summary, subject: &Subject, cell: &Cell) -> String {
 
 /// Each count's verdict.
 fn count_verdicts(summary: &Summary, stretch: &Stretch, subject: &Subject) -> Vec<Verdict> {
-    let verdict = |cell: &Cell| count_against(summary, subject, cell).map(|against| stretch.judge(&against.excess));
+    let verdict = |cell: &Cell| count_against(summary, subject, cell).map(|against| stretch.judge(&against));
     subject.counts.iter().map(|cell| verdict(cell).unwrap_or(Verdict::CannotTell)).collect()
 }
 
@@ -134,24 +189,24 @@ fn count_words(summary: &Summary, stretch: &Stretch, subject: &Subject) -> Strin
 }
 
 /// Who is worse at which count and by how much, who is stable, of whom it cannot be told.
-fn count_sentence(summary: &Summary, stretch: &Stretch, scene: usize, subjects: &[&Subject]) -> String {
-    let Some(asked) = summary.about.experiment.stability.as_ref() else { return String::new() };
+fn count_sentences(summary: &Summary, stretch: &Stretch, scene: usize, subjects: &[&Subject]) -> Vec<String> {
+    let Some(asked) = summary.about.experiment.stability.as_ref() else { return Vec::new() };
     let mut groups: Vec<(String, Vec<String>)> = Vec::new();
     for (i, &count) in asked.counts().iter().enumerate() {
         let worse = subjects.iter().filter(|s| count_verdicts(summary, stretch, s)[i] == Verdict::Worse);
         let members = worse.filter_map(|subject| {
             let against = count_against(summary, subject, &subject.counts[i])?;
-            let (who, times, rows) =
-                (name(summary, subject.sampler), times(&against.excess), rows(&[&subject.counts[i], &subject.base]));
-            Some(format!("{who} (by a factor of {times} over what is promised {rows})"))
+            let rows = rows(&[&subject.counts[i], &subject.base]);
+            Some(format!("{} {} {rows}", name_and_limit(summary, subject), times(&stretch.stretched(&against))))
         });
-        groups.push((format!("worse {}", way_of(asked.spp, count)), members.collect()));
+        let words = format!("worse {} (RMSE over the promised, stretched intervals)", way_of(asked.spp, count));
+        groups.push((words, members.collect()));
     }
     for (words, word) in [("stable at every count", "stable"), ("cannot tell", "cannot tell")] {
         let members = subjects.iter().filter(|subject| count_words(summary, stretch, subject) == word);
-        groups.push((words.to_owned(), members.map(|subject| name(summary, subject.sampler)).collect()));
+        groups.push((words.to_owned(), members.map(|subject| name_and_limit(summary, subject)).collect()));
     }
-    told(&scene_name(summary, scene), &groups)
+    told_in_items(&scene_name(summary, scene), &groups)
 }
 
 // --- replicates ---
@@ -164,10 +219,10 @@ fn replicates(summary: &Summary, page: &mut Page) {
         return;
     }
     page.paragraph(&format!(
-        "Worst, best and median RMSE of {n} replicates. The range of {n} holds the median of all possible ones with probability 1 − 2^(1 − {n}) = {}; one more replicate is worse than the \
-         worst of them with probability 1/{}. *Narrow*: worst / best is at most {WIDE}, so the worst is at most that many times the true median wherever the range holds it; \
-         *wide*: the worst is more than {WIDE} times that order statistic which the true median exceeds with a chance of at most 5 % (a line; none below 5 replicates).",
-        percent_of_certainty(n),
+        "How much the RMSE of {n} replicates varies: its coefficient of variation (standard deviation over mean), which does not grow with their number as a range does, with the 95 % interval of a normal \
+         standard deviation. *Narrow*: at most {} with the whole interval; *wide*: more with the whole interval. Each verdict stands by itself: one in twenty may err. One more replicate is worse than \
+         the worst of them with probability 1/{}.",
+        percent(WIDE),
         n + 1
     ));
     let word = |verdict: SpreadVerdict| match verdict {
@@ -181,17 +236,25 @@ fn replicates(summary: &Summary, page: &mut Page) {
         .iter()
         .map(|subject| {
             let numbers = match of(subject) {
-                _ if subject.base.is_fixed => ["–", "–", "–", "nothing random"].map(str::to_owned),
-                None => ["–", "–", "–", "cannot tell"].map(str::to_owned),
-                Some(s) => [short(s.median), short(s.worst), short(s.best), word(s.verdict).to_owned()],
+                _ if subject.base.is_fixed => ["–", "–", "–", "–", "nothing random"].map(str::to_owned),
+                None => ["–", "–", "–", "–", "cannot tell"].map(str::to_owned),
+                Some(s) => [
+                    short(s.median),
+                    short(s.worst),
+                    short(s.best),
+                    with_interval(&s.variation, percent),
+                    word(s.verdict).to_owned(),
+                ],
             };
             [scene_name(summary, subject.scene), name(summary, subject.sampler)].into_iter().chain(numbers).collect()
         })
         .collect();
     let spp = summary.about.experiment.stability.as_ref().map_or(0, |stability| stability.spp);
-    let caption =
-        format!("Median RMSE in W/(m² sr) of {n} replicates at {spp} spp, and the worst and best over it (no unit).");
-    let head = ["scene", "sampler", "median RMSE", "worst / median", "best / median", "spread"];
+    let caption = format!(
+        "Median RMSE in W/(m² sr) of {n} replicates at {spp} spp, the worst and best over it, and the coefficient of variation with its 95 % interval (no units)."
+    );
+    let head =
+        ["scene", "sampler", "median RMSE", "worst / median", "best / median", "coefficient of variation", "spread"];
     tabulate_folded(page, "spread", "Worst, best and median replicate", &caption, &head, &lines);
     let items: Vec<String> = by_scene(summary)
         .iter()
@@ -217,12 +280,6 @@ fn replicates(summary: &Summary, page: &mut Page) {
     page.bullets(&items);
 }
 
-/// 1 − 2^(1 − n) with as many nines as it has.
-fn percent_of_certainty(n: u32) -> String {
-    let miss = libm::pow(2.0, 1.0 - f64::from(n));
-    if miss < 5e-4 { format!("1 − {}", short(miss)) } else { format!("{:.1} %", 100.0 * (1.0 - miss)) }
-}
-
 // --- another unit of length ---
 
 /// The scaled makings of a subject.
@@ -238,7 +295,8 @@ fn scales(summary: &Summary, page: &mut Page) {
     page.paragraph(&format!(
         "The scene with all lengths (mesh, camera, lens, focus) multiplied, the same seeds: radiance does not depend on the unit of length, so nothing but roundings may change. A rounding may \
          move a ray across an edge, and then a pixel jumps (by more than {} of the mean radiance). *Unchanged beyond rounding*: in no replicate do more than {} of the pixels jump, and none differs by a root mean \
-         square of more than {} of the RMSE, so that the RMSE cannot change by more either; *changed*: more than that in one replicate at least. Of all replicates the worst is shown.",
+         square of more than {} of the mean radiance; *changed*: more than that in one replicate at least. Of all replicates the worst is shown. Ratios are paired, so the reference's noise, common \
+         to both, is not in their intervals; one image each has none, unless its reference is exact.",
         short(JUMP),
         percent(JUMPING),
         percent(ROUNDING)
@@ -252,7 +310,7 @@ fn scales(summary: &Summary, page: &mut Page) {
                 scene_name(summary, subject.scene),
                 name(summary, subject.sampler),
                 format!("1e{power}").replace('-', "−"),
-                of(remade_ratio(&subject.base, cell).map(|ratio| with_interval(&ratio, |x| format!("{x:.4}")))),
+                of(scaled_ratio(&subject.base, cell).map(|ratio| with_interval(&ratio, |x| format!("{x:.4}")))),
                 of(d.map(|d| percent(d.differing))),
                 of(d.map(|d| percent(d.jumping))),
                 of(d.map(|d| short(d.largest))),
@@ -269,7 +327,7 @@ fn scales(summary: &Summary, page: &mut Page) {
         "pixels that differ in a bit",
         "pixels that jump",
         "largest difference / mean",
-        "RMS difference / RMSE",
+        "RMS difference / mean",
         "verdict",
     ];
     let spp = summary.about.experiment.stability.as_ref().map_or(0, |stability| stability.spp);
@@ -326,7 +384,8 @@ fn passes(summary: &Summary, stretch: &Stretch, page: &mut Page) {
     page.heading(3, "Two passes");
     page.paragraph(&format!(
         "The driver of the sheet's framework makes a first pass of 1 sample and a second of {}, in which the samplers begin anew: a deterministic sequence repeats its first point, a randomised one \
-         draws another randomisation, and a set made for {} points is replaced by one for {}. The mean, weighted by the samples taken, against one pass of {}; promised is what the samples taken are worth.",
+         draws another randomisation, and a set made for {} points is replaced by one for {}. The mean, weighted by the samples taken, against one pass of {}; promised is what the samples taken are worth, as above. Ratios are paired, so the reference's noise, common to both, \
+         is not in their intervals (of one image each it is all that they hold).",
         asked.spp - 1,
         asked.spp,
         asked.spp - 1,
@@ -350,13 +409,22 @@ fn passes(summary: &Summary, stretch: &Stretch, page: &mut Page) {
                 taken,
                 ratio_cell(against.map(|against| against.ratio)),
                 against.map_or("–".to_owned(), |against| short(against.promised.value)),
+                ratio_cell(against.map(|against| stretch.stretched(&against))),
                 equal,
                 pass_word(pass_verdict(summary, stretch, subject)).to_owned(),
             ])
         })
         .collect();
-    let head =
-        ["scene", "sampler", "samples taken", "RMSE in two / in one", "promised", "bit for bit equal", "verdict"];
+    let head = [
+        "scene",
+        "sampler",
+        "samples taken",
+        "RMSE in two / in one",
+        "promised",
+        "the one over the other, stretched",
+        "bit for bit equal",
+        "verdict",
+    ];
     let caption = format!(
         "RMSE of two passes of 1 and {} spp over that of one pass of {} (no unit), replicate by replicate; {}.",
         asked.spp - 1,
@@ -371,7 +439,7 @@ fn passes(summary: &Summary, stretch: &Stretch, page: &mut Page) {
 
 fn pass_verdict(summary: &Summary, stretch: &Stretch, subject: &Subject) -> Verdict {
     let against = in_passes(subject).and_then(|cell| passes_against(summary, subject, cell));
-    against.map_or(Verdict::CannotTell, |against| stretch.judge(&against.excess))
+    against.map_or(Verdict::CannotTell, |against| stretch.judge(&against))
 }
 
 fn pass_word(verdict: Verdict) -> &'static str {
@@ -388,14 +456,15 @@ fn pass_sentence(summary: &Summary, stretch: &Stretch, scene: usize, subjects: &
         .map(|verdict| {
             let members = subjects.iter().filter(|subject| pass_verdict(summary, stretch, subject) == verdict);
             let members = members.map(|subject| {
-                let who = name(summary, subject.sampler);
+                let who = name_and_limit(summary, subject);
                 let cell = in_passes(subject).filter(|_| verdict == Verdict::Worse);
                 let against = cell.and_then(|cell| Some((cell, passes_against(summary, subject, cell)?)));
                 against.map_or(who.clone(), |(cell, against)| {
-                    format!("{who} ({} {})", times(&against.ratio), rows(&[cell, &subject.base]))
+                    format!("{who} {} {}", times(&stretch.stretched(&against)), rows(&[cell, &subject.base]))
                 })
             });
-            (pass_word(verdict).to_owned(), members.collect())
+            let by = if verdict == Verdict::Worse { " (over the promised, stretched intervals)" } else { "" };
+            (format!("{}{by}", pass_word(verdict)), members.collect())
         })
         .collect();
     told(&scene_name(summary, scene), &groups)

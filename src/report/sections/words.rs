@@ -16,10 +16,16 @@ pub fn scene_name(summary: &Summary, scene: usize) -> String {
     format!("`{}`", summary.scenes[scene].name)
 }
 
-/// Row ids, shortened to what tells them apart in practice.
+/// Row ids, shortened to what tells them apart in practice; those of reference-limited cells say so.
 pub fn rows(cells: &[&Cell]) -> String {
-    let ids: Vec<String> = cells.iter().map(|cell| row(&cell.id)).collect();
+    let limited = |cell: &Cell| if cell.is_reference_limited { " reference-limited" } else { "" };
+    let ids: Vec<String> = cells.iter().map(|cell| format!("{}{}", row(&cell.id), limited(cell))).collect();
     format!("({} {})", if ids.len() == 1 { "row" } else { "rows" }, ids.join(", "))
+}
+
+/// The row of a cell, marked where it is reference-limited.
+pub fn marked_row(cell: &Cell) -> String {
+    format!("{}{}", row(&cell.id), super::reference::mark(cell))
 }
 
 /// One row's id as code: its first eight digits.
