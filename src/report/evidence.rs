@@ -131,10 +131,20 @@ pub fn interpolated(points: &[(f64, Estimate)], x: f64) -> Option<Estimate> {
     Some(Estimate { value: between(a.value, b.value)?, ci95 })
 }
 
+/// Ratios nearer to 1 than this factor are called no difference, however narrow their intervals.
+pub const LEAST_FACTOR: f64 = 1.01;
+
 /// Is a ratio above 1, by the same distance that [`is_biased`] asks for: 1 more than twice as far from the ratio, on a
-/// logarithmic scale, as its interval's low end?
+/// logarithmic scale, as its interval's low end, and the ratio above [`LEAST_FACTOR`]?
 pub fn clearly_above_one(ratio: &Estimate) -> bool {
-    ratio.value > 1.0 && ratio.ci95.is_some_and(|[low, _]| low > ratio.value.sqrt())
+    ratio.value > LEAST_FACTOR && ratio.ci95.is_some_and(|[low, _]| low > ratio.value.sqrt())
+}
+
+/// Is a ratio below 1, by the rule of [`clearly_above_one`]?
+pub fn clearly_below_one(ratio: &Estimate) -> bool {
+    ratio.value > 0.0
+        && ratio.value < 1.0 / LEAST_FACTOR
+        && ratio.ci95.is_some_and(|[_, high]| high < ratio.value.sqrt())
 }
 
 /// Where the error of a sampler goes as samples are added.
@@ -144,6 +154,9 @@ pub enum Limit {
     Wrong,
     /// It stays, but differs from replicate to replicate: right on average, and more samples do not help.
     Stalls,
+    /// It stays, a part of it the same in every replicate and a part not: the image converges to none, and is not right on
+    /// average either.
+    StallsBiased,
     /// It falls.
     Falls,
     /// The intervals allow more than one of these.
@@ -172,6 +185,8 @@ pub struct Course {
     pub bias2: Estimate,
     /// bias² at the higher count over bias² at the lower one; `None` where one of them is not above 0.
     pub bias2_ratio: Option<Estimate>,
+    /// Variance at the higher count over that at the lower one; `None` where nothing is random or one is not above 0.
+    pub variance_ratio: Option<Estimate>,
 }
 
 impl Course {
@@ -188,14 +203,20 @@ impl Course {
     /// Where the error goes.
     ///
     /// *Falls*: the RMSE's ratio lies below [`border`](Self::border) with its whole interval. *Wrong*: it lies above, there
-    /// is a bias, and the ratio of bias² lies above the same border, squared. *Stalls*: it lies above and no bias is seen.
-    /// All else is unclear.
+    /// is a bias, and the ratio of bias² lies above the same border, squared, that of the variance below it, or nothing is
+    /// random. *Stalls and is biased*: the same, but the variance's ratio lies above, too: there is no image that all
+    /// replicates converge to. *Stalls*: the RMSE's lies above and no bias is seen. All else is unclear.
     pub fn limit(&self) -> Limit {
         let border2 = self.border() * self.border();
         let bias_stays = self.bias2_ratio.map_or(Answer::CannotTell, |ratio| above(&ratio, border2));
+        let variance_falls = self.variance_ratio.map_or(Answer::Yes, |ratio| below(&ratio, border2));
         match (below(&self.rmse_ratio, self.border()), self.is_biased(), bias_stays) {
             (Answer::Yes, ..) => Limit::Falls,
-            (Answer::No, Answer::Yes, Answer::Yes) => Limit::Wrong,
+            (Answer::No, Answer::Yes, Answer::Yes) => match variance_falls {
+                Answer::Yes => Limit::Wrong,
+                Answer::No => Limit::StallsBiased,
+                Answer::CannotTell => Limit::Unclear,
+            },
             (Answer::No, Answer::No, _) => Limit::Stalls,
             _ => Limit::Unclear,
         }
@@ -318,6 +339,14 @@ mod tests {
     }
 
     #[test]
+    fn better_and_worse_are_called_by_one_rule_and_never_of_a_hundredth() {
+        assert!(!clearly_above_one(&e(1.005, 1.005, 1.005)) && clearly_above_one(&e(1.02, 1.02, 1.02)));
+        assert!(!clearly_below_one(&e(0.995, 0.995, 0.995)) && clearly_below_one(&e(0.98, 0.98, 0.98)));
+        assert!(clearly_below_one(&e(0.64, 0.5, 0.79)) && !clearly_below_one(&e(0.64, 0.5, 0.9)));
+        assert!(!clearly_below_one(&Estimate::without_interval(0.5)));
+    }
+
+    #[test]
     fn a_bias_is_called_only_at_twice_its_interval() {
         assert_eq!(is_biased(&e(1.0, 0.6, 1.4)), Answer::Yes);
         assert_eq!(is_biased(&e(1.0, 0.4, 1.6)), Answer::CannotTell);
@@ -330,16 +359,22 @@ mod tests {
     #[test]
     fn the_course_of_an_error_is_named_by_its_numbers() {
         let course = |rmse_ratio, bias2: Estimate, before: Estimate| {
-            Course { rmse_ratio, independent: 0.25, bias2, bias2_ratio: ratio(&bias2, &before) }.limit()
+            let bias2_ratio = ratio(&bias2, &before);
+            Course { rmse_ratio, independent: 0.25, bias2, bias2_ratio, variance_ratio: None }
         };
+        let with_variance = |course: Course, variance| Course { variance_ratio: Some(variance), ..course }.limit();
         let (flat, falling, torn) = (e(0.95, 0.9, 1.0), e(0.26, 0.24, 0.28), e(0.5, 0.4, 0.6));
         let (biased, unbiased) = (e(1e-3, 9e-4, 1.1e-3), e(1e-5, -1e-5, 3e-5));
-        assert_eq!(course(flat, biased, biased), Limit::Wrong);
-        assert_eq!(course(flat, unbiased, unbiased), Limit::Stalls);
-        assert_eq!(course(flat, biased, e(1e-1, 9e-2, 1.1e-1)), Limit::Unclear, "its bias falls");
-        assert_eq!(course(falling, biased, biased), Limit::Falls);
-        assert_eq!(course(torn, biased, biased), Limit::Unclear);
-        assert_eq!(course(flat, Estimate::without_interval(1e-3), biased), Limit::Unclear);
-        assert_eq!(course(Estimate::without_interval(0.9), biased, biased), Limit::Unclear);
+        assert_eq!(course(flat, biased, biased).limit(), Limit::Wrong, "nothing random");
+        let both = course(flat, biased, biased);
+        assert_eq!(with_variance(both, e(0.07, 0.06, 0.08)), Limit::Wrong);
+        assert_eq!(with_variance(both, e(0.75, 0.7, 0.8)), Limit::StallsBiased, "it converges to no image");
+        assert_eq!(with_variance(both, e(0.25, 0.2, 0.3)), Limit::Unclear);
+        assert_eq!(course(flat, unbiased, unbiased).limit(), Limit::Stalls);
+        assert_eq!(course(flat, biased, e(1e-1, 9e-2, 1.1e-1)).limit(), Limit::Unclear, "its bias falls");
+        assert_eq!(course(falling, biased, biased).limit(), Limit::Falls);
+        assert_eq!(course(torn, biased, biased).limit(), Limit::Unclear);
+        assert_eq!(course(flat, Estimate::without_interval(1e-3), biased).limit(), Limit::Unclear);
+        assert_eq!(course(Estimate::without_interval(0.9), biased, biased).limit(), Limit::Unclear);
     }
 }

@@ -37,6 +37,12 @@ pub fn signed(x: f64) -> String {
     if text == "−0.00" || text == "+0.00" { "0.00".to_owned() } else { text }
 }
 
+/// A slope: three decimals, with a sign, since intervals of slopes are often narrower than a hundredth.
+pub fn slope_text(x: f64) -> String {
+    let text = format!("{x:+.3}").replace('-', "−");
+    if text == "−0.000" || text == "+0.000" { "0.000".to_owned() } else { text }
+}
+
 /// `[low, high]`.
 pub fn interval([low, high]: [f64; 2], text: impl Fn(f64) -> String) -> String {
     format!("[{}, {}]", text(low), text(high))
@@ -120,6 +126,7 @@ mod tests {
         assert_eq!(estimate(&e(Some([0.4, 0.6]))), "0.500 [0.400, 0.600]");
         assert_eq!(estimate(&e(Some([0.5, 0.5]))), "0.500 (exact)");
         assert_eq!(estimate(&e(None)), "0.500 (no interval)");
+        assert_eq!((slope_text(-0.6651), slope_text(-0.0001)), ("−0.665".to_owned(), "0.000".to_owned()));
         assert_eq!(signed_estimate(&Estimate { value: -0.501, ci95: Some([-0.52, -0.001]) }), "−0.50 [−0.52, 0.00]");
     }
 

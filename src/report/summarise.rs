@@ -15,7 +15,7 @@ use crate::experiment::spec::{Experiment, Pictures, SamplerEntry};
 use crate::sampling::{Decision, Order, Points, Preset, Random, SamplerSet, SamplerSpec, Scope};
 use crate::stats::{Estimate, SlopeFit, slope_with_interval, t_interval};
 
-use super::evidence::{Course, ratio, ratio_of_roots};
+use super::evidence::{Course, clearly_above_one, ratio, ratio_of_roots};
 use super::shots::{PictureSet, Shot};
 use super::style::{Style, style_of, style_of_set};
 pub use variants::Subject;
@@ -119,6 +119,25 @@ impl SamplerSummary {
     /// Whether it is a set of different samplers for different decisions.
     pub fn is_mixed(&self) -> bool {
         self.set.is_some_and(|set| set.single().is_none())
+    }
+
+    /// Why nothing promises that its image becomes the right one in a scene with `decisions`, however small the bias that is
+    /// seen; `None` where its construction does, or where it cannot be read.
+    ///
+    /// Uniform numbers are independent in any order. Of other sets two decisions that read the same points in the same order
+    /// never see most combinations; without a randomisation, or with one that leaves an axis as it is, there is no average
+    /// over images that is right by construction.
+    pub fn unproven(&self, decisions: &[Decision]) -> Option<&'static str> {
+        let set = self.set?;
+        let specs: Vec<SamplerSpec> = decisions.iter().map(|&decision| set.of(decision)).collect();
+        let is_set = |spec: &&SamplerSpec| spec.points != Points::Uniform;
+        if specs.iter().filter(is_set).filter(|spec| spec.order == Order::Step).count() > 1 {
+            return Some("decisions in step");
+        }
+        let leaves_an_axis = |spec: &SamplerSpec| spec.random == Random::Yxor && spec.order != Order::Shuffle;
+        let mut specs = specs.iter().filter(is_set);
+        let found = specs.find(|spec| !spec.is_random() || leaves_an_axis(spec))?;
+        Some(if found.is_random() { "an axis that is not randomised" } else { "nothing random" })
     }
 
     /// Whether each pixel sees the same points, or one axis of them, in some decision, so that neighbours may err alike.
@@ -316,6 +335,15 @@ impl Summary {
         course(self.cell(scene, sampler, from)?, self.cell(scene, sampler, to)?)
     }
 
+    /// The last step of a sampler's error: between its two largest powers of two.
+    pub fn last_step(&self, scene: usize, sampler: usize) -> Option<Step> {
+        let mut cells = self.cells_of(scene, sampler);
+        cells.retain(|cell| cell.spp.taken.is_power_of_two());
+        let [.., from, to] = cells[..] else { return None };
+        let rmse_ratio = ratio_of_roots(&to.mse, &from.mse)?;
+        (from.spp.taken < to.spp.taken).then_some(Step { from: from.spp.taken, to: to.spp.taken, rmse_ratio })
+    }
+
     /// The sheet's shortcut in a scene, by a sampler, with a count asked for.
     pub fn shortcut_cell(&self, scene: usize, sampler: usize, asked: u32) -> Option<&Cell> {
         self.shortcut.iter().find(|c| c.scene == scene && c.sampler == sampler && c.spp.asked == asked)
@@ -328,6 +356,35 @@ impl Summary {
     }
 }
 
+/// One step of an error from a count to a higher one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// The lower count of samples per pixel.
+    pub from: u32,
+    /// The higher one.
+    pub to: u32,
+    /// RMSE at the higher count over RMSE at the lower one.
+    pub rmse_ratio: Estimate,
+}
+
+impl Step {
+    /// Local slope: ln of the ratio over ln(to/from), with its interval.
+    pub fn slope(&self) -> Estimate {
+        let log = libm::log(f64::from(self.to) / f64::from(self.from));
+        let slope = |ratio: f64| libm::log(ratio) / log;
+        Estimate { value: slope(self.rmse_ratio.value), ci95: self.rmse_ratio.ci95.map(|ends| ends.map(slope)) }
+    }
+
+    /// Whether the error falls less than that of independent samples would: the ratio over √(from/to) is
+    /// [`clearly_above_one`].
+    pub fn is_flatter_than_independent(&self) -> bool {
+        let independent = (f64::from(self.from) / f64::from(self.to)).sqrt();
+        let Estimate { value, ci95 } = self.rmse_ratio;
+        let over = |x: f64| x / independent;
+        clearly_above_one(&Estimate { value: over(value), ci95: ci95.map(|ends| ends.map(over)) })
+    }
+}
+
 /// Where an error goes from one count to a higher one.
 fn course(from: &Cell, to: &Cell) -> Option<Course> {
     Some(Course {
@@ -335,6 +392,7 @@ fn course(from: &Cell, to: &Cell) -> Option<Course> {
         independent: (f64::from(from.spp.taken) / f64::from(to.spp.taken)).sqrt(),
         bias2: to.bias2,
         bias2_ratio: ratio(&to.bias2, &from.bias2),
+        variance_ratio: from.variance.zip(to.variance).and_then(|(from, to)| ratio(&to, &from)),
     })
 }
 

@@ -4,8 +4,8 @@ use rand_pcg::Pcg32;
 use rand_pcg::rand_core::Rng;
 use serde::{Deserialize, Serialize};
 
-use super::moments::{student_t_quantile, sum};
-use super::special::normal_upper_tail;
+use super::moments::{Moments, student_t_quantile, sum};
+use super::special::{incomplete_beta, normal_upper_tail};
 
 /// Bootstrap draws behind an interval.
 pub const BOOTSTRAP_DRAWS: usize = 2000;
@@ -73,6 +73,25 @@ pub struct SlopeFit {
     pub points: usize,
     /// What the interval was made from.
     pub interval: IntervalKind,
+    /// p-value of the hypothesis that the points lie on a line; `None` with fewer than three of them, or without replicates
+    /// that differ at each n.
+    pub line_p: Option<f64>,
+    /// Largest distance of a point from the line, in ln RMSE.
+    pub largest_residual: f64,
+}
+
+/// Chance by which a power law that holds is rejected, at most.
+pub const LACK_OF_FIT_LEVEL: f64 = 0.01;
+
+/// Distances from a line, in ln RMSE, that are too small to matter, however sure they are: about 5 %.
+pub const LEAST_RESIDUAL: f64 = 0.05;
+
+impl SlopeFit {
+    /// Whether the points are no line, so that one slope does not tell how the error falls: the test rejects one at
+    /// [`LACK_OF_FIT_LEVEL`], and a point lies more than [`LEAST_RESIDUAL`] from it.
+    pub fn is_no_power_law(&self) -> bool {
+        self.largest_residual > LEAST_RESIDUAL && self.line_p.is_some_and(|p| p < LACK_OF_FIT_LEVEL)
+    }
 }
 
 /// Slope of RMSE in n: half the least-squares slope of ln(mean MSE over replicates) against ln n.
@@ -89,6 +108,10 @@ pub struct SlopeFit {
 /// and where such draws fill a tail there is no interval.
 ///
 /// *Without*: residuals about the line, from three points on; see [`IntervalKind::Residuals`].
+///
+/// *Is it a line?* Q = Σ w_k (y_k − ŷ_k)² about the line fitted with the weights w_k = mean²/(s²/R) (the delta method's
+/// inverse variance of ln mean MSE) is compared as Q/(K − 2) with F(K − 2, least R_k − 1): cautious, since each weight is
+/// estimated from R_k − 1 degrees of freedom only.
 ///
 /// `None` where fewer than two different n remain.
 ///
@@ -110,13 +133,42 @@ pub fn slope_with_interval(ns: &[f64], replicate_mse: &[Vec<f64>], seed: u64) ->
         (IntervalKind::Residuals, residual_interval(&x, &y, fit))
     };
     let half = |v: f64| 0.5 * v;
+    let residuals = x.iter().zip(&y).map(|(x, y)| (y - fit.intercept - fit.slope * x).abs());
+    let largest_residual = half(residuals.fold(0.0, f64::max));
     Some(SlopeFit {
         slope: half(fit.slope),
         ci95: ci95.map(|ends| ends.map(half)),
         intercept: half(fit.intercept),
         points: fit.points,
         interval,
+        line_p: line_p(&x, &y, &kept),
+        largest_residual,
     })
+}
+
+/// p-value of the lack-of-fit test of [`slope_with_interval`].
+fn line_p(x: &[f64], y: &[f64], kept: &[(f64, &[f64])]) -> Option<f64> {
+    let weight = |values: &[f64]| {
+        let moments: Moments = values.iter().copied().collect();
+        let relative = moments.standard_error()? / moments.mean()?;
+        (relative > 0.0 && relative.is_finite()).then(|| 1.0 / (relative * relative))
+    };
+    let weights: Vec<f64> = kept.iter().map(|(_, values)| weight(values)).collect::<Option<_>>()?;
+    if x.len() < 3 {
+        return None;
+    }
+    let weighted = |value: &dyn Fn(usize) -> f64| sum((0..x.len()).map(|k| weights[k] * value(k)));
+    let total = weighted(&|_| 1.0);
+    let (mean_x, mean_y) = (weighted(&|k| x[k]) / total, weighted(&|k| y[k]) / total);
+    let spread = weighted(&|k| (x[k] - mean_x) * (x[k] - mean_x));
+    let slope = weighted(&|k| (x[k] - mean_x) * (y[k] - mean_y)) / spread;
+    let q = weighted(&|k| {
+        let residual = y[k] - mean_y - slope * (x[k] - mean_x);
+        residual * residual
+    });
+    let (d1, d2) = ((x.len() - 2) as f64, kept.iter().map(|(_, values)| values.len() - 1).min()? as f64);
+    // P(F > q/d1) = I_{d2/(d2 + q)}(d2/2, d1/2).
+    Some(incomplete_beta(0.5 * d2, 0.5 * d1, d2 / (d2 + q), q / (d2 + q)))
 }
 
 /// The expanded percentile interval of the slope of ln mean MSE.
@@ -239,6 +291,28 @@ mod tests {
         let (a, b, c) = (11, 11, 12);
         let fit = |seed| slope_with_interval(&NS, &mse, seed);
         assert!(fit(a) == fit(b) && fit(a) != fit(c));
+    }
+
+    /// 400 power laws of 8 replicates at 6 n are rejected at most at the stated 1 % (4 ± 2 of 400; 12 is 4 standard errors
+    /// above it), and a curve that flattens from −½ to 0 always.
+    #[test]
+    fn lines_are_told_from_curves_at_the_stated_rate() {
+        let mut rng = Pcg32::new(9, 9);
+        let fit = |mse: &[Vec<f64>]| slope_with_interval(&NS, mse, 1).expect("a line");
+        let mut lines = 0;
+        for _ in 0..400 {
+            let mse: Vec<Vec<f64>> = NS.iter().map(|n| monte_carlo(&mut rng, *n, 8)).collect();
+            lines += i32::from(fit(&mse).line_p.expect("a test") < LACK_OF_FIT_LEVEL);
+        }
+        assert!(lines <= 12, "{lines} of 400 lines");
+        for _ in 0..20 {
+            // Replicates within 5 % of 1/n + 1/16.
+            let mut near = |mean: f64| mean * (0.95 + 0.1 * f64::from(rng.next_u32()) / 4_294_967_296.0);
+            let mse: Vec<Vec<f64>> = NS.iter().map(|n| (0..8).map(|_| near(1.0 / n + 0.0625)).collect()).collect();
+            assert!(fit(&mse).is_no_power_law());
+        }
+        let exact: Vec<Vec<f64>> = NS.iter().map(|n| vec![1.0 / n; 2]).collect();
+        assert_eq!((fit(&exact).line_p, fit(&exact).is_no_power_law()), (None, false), "nothing differs, so no test");
     }
 
     /// Independent samples: RMSE ~ n^−½. 400 experiments of 8 replicates at 6 n: a true 95 % has a standard error of

@@ -217,6 +217,11 @@ pub fn chi2_upper_tail(statistic: f64, df: f64) -> f64 {
     incomplete_gamma_upper(0.5 * df, 0.5 * statistic)
 }
 
+/// P(|T| > |t|) of Student's t with `df` > 0 degrees of freedom.
+pub fn two_sided(t: f64, df: f64) -> f64 {
+    student_two_sided(t, df)
+}
+
 /// P(Z > z) of the standard normal distribution.
 pub fn normal_tail(z: f64) -> f64 {
     normal_upper_tail(z)

@@ -20,7 +20,7 @@ mod special;
 pub mod trimmed;
 
 pub use discrepancy::{L2Kind, Points, PointsError, Side, Star};
-pub use fit::{IntervalKind, LineFit, SlopeFit, loglog_slope, slope_with_interval};
+pub use fit::{IntervalKind, LACK_OF_FIT_LEVEL, LEAST_RESIDUAL, LineFit, SlopeFit, loglog_slope, slope_with_interval};
 pub use hypothesis::{Family, Outcome, Verdict, chi2_test, t_test, z_test};
 pub use image_error::Ensemble;
-pub use moments::{Estimate, Moments, jackknife, sum, t_interval, variance_interval};
+pub use moments::{Estimate, Moments, jackknife, student_t_quantile, sum, t_interval, variance_interval};

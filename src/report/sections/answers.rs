@@ -1,11 +1,11 @@
 //! The answer box: at most eight lines that answer the sheet's questions.
 
-use crate::sampling::{Order, Points, Preset};
+use crate::sampling::{Decision, Order, Points, Preset};
 
 use super::super::evidence::{Answer, Limit, below};
 use super::super::markdown::{Page, link_to, table_ref};
 use super::super::numbers::{listed, signed_estimate};
-use super::super::summarise::{Cell, Summary};
+use super::super::summarise::{Cell, SamplerSummary, Summary};
 use super::correlation::patterns;
 use super::decisions;
 use super::identical::bytes;
@@ -33,10 +33,16 @@ pub fn section(summary: &Summary, page: &mut Page) {
     page.numbered(&lines);
 }
 
-/// Index of the family's cure, or of the only preset there is.
+/// Index of the family's cure, else of another of the family whose construction promises the right image, else of a preset.
 fn recommended(summary: &Summary, points: Points) -> Option<usize> {
     let preset = |preset| summary.preset(points, preset);
-    preset(Preset::Best).or_else(|| preset(Preset::Sheet)).or_else(|| preset(Preset::Plain))
+    let sound = || {
+        let is_sound = |s: &SamplerSummary| {
+            s.spec().is_some_and(|spec| spec.points == points) && s.unproven(&Decision::ALL).is_none()
+        };
+        summary.samplers.iter().position(is_sound)
+    };
+    preset(Preset::Best).or_else(sound).or_else(|| preset(Preset::Sheet)).or_else(|| preset(Preset::Plain))
 }
 
 /// One technique: what it gains over uniform sampling, and what it costs.
@@ -63,7 +69,7 @@ fn uniform_line(summary: &Summary, uniform: usize) -> Option<String> {
         let slope = crate::stats::Estimate { value: fit.slope, ci95: fit.ci95 };
         format!(", slope {}", signed_estimate(&slope))
     });
-    let (spp, better, others) = beaten_by(summary, scene, uniform)?;
+    let (base, better, others) = beaten_by(summary, scene, uniform)?;
     let right = match unbiased {
         0 => "that there is no bias cannot be claimed in any scene".to_owned(),
         n => format!("advantage: no bias seen in {n} of {}", super::words::scenes(cells.len())),
@@ -73,24 +79,26 @@ fn uniform_line(summary: &Summary, uniform: usize) -> Option<String> {
         _ => "disadvantage: slow",
     };
     Some(format!(
-        "{right} (in {}: {}); {slow}{}: at {spp} spp {better} of {others} others have a smaller error ({}). {}",
+        "{right} (in {}: {}); {slow}{}: in {} at {} spp {better} of {others} others have a smaller error ({}). {}",
         scene_name(summary, scene),
         bias_short(cell),
         slope.unwrap_or_default(),
+        scene_name(summary, scene),
+        base.spp.asked,
         link_to(titles::CONVERGENCE),
-        rows(&[cell])
+        rows(&[cell, base])
     ))
 }
 
-/// How many of the other samplers have a smaller error.
-fn beaten_by(summary: &Summary, scene: usize, uniform: usize) -> Option<(u32, usize, usize)> {
+/// Uniform sampling's cell at the middle count, and how many of the other samplers have a smaller error than it.
+fn beaten_by(summary: &Summary, scene: usize, uniform: usize) -> Option<(&Cell, usize, usize)> {
     let spp = summary.middle_spp()?;
     let base = summary.cell(scene, uniform, spp)?;
     let others: Vec<&Cell> =
         (0..summary.samplers.len()).filter(|&i| i != uniform).filter_map(|i| summary.cell(scene, i, spp)).collect();
     let better =
         others.iter().filter(|cell| rmse_ratio(cell, base).is_some_and(|r| below(&r, 1.0) == Answer::Yes)).count();
-    Some((spp, better, others.len()))
+    Some((base, better, others.len()))
 }
 
 /// RMSE against uniform sampling's in every scene.
@@ -139,7 +147,7 @@ fn literal(summary: &Summary, points: Points) -> Option<String> {
         let has = |&scene: &usize| summary.course(scene, sheet).is_some_and(|course| course.limit() == wanted);
         (0..summary.scenes.len()).filter(has).collect()
     };
-    let (wrong, stalls) = (by(Limit::Wrong), by(Limit::Stalls));
+    let (wrong, stalls, both) = (by(Limit::Wrong), by(Limit::Stalls), by(Limit::StallsBiased));
     let told = |scenes: &[usize]| {
         let items: Vec<String> = scenes
             .iter()
@@ -156,6 +164,9 @@ fn literal(summary: &Summary, points: Points) -> Option<String> {
     }
     if !stalls.is_empty() {
         parts.push(format!("stalls in {}", told(&stalls)));
+    }
+    if !both.is_empty() {
+        parts.push(format!("stalls, and is biased, in {}", told(&both)));
     }
     let (who, link) = (name(summary, sheet), link_to(titles::DECISIONS));
     Some(match parts.as_slice() {
@@ -194,8 +205,14 @@ fn identical(summary: &Summary, scene: usize) -> Option<String> {
 fn helps(summary: &Summary, scene: usize) -> Option<String> {
     let (uniform, spp) = (summary.uniform()?, summary.middle_spp()?);
     let base = summary.cell(scene, uniform, spp)?;
+    // Points that keep apart in each decision by itself: with decisions in step or joint, more than that is at work.
+    let is_shuffled = |i: usize| {
+        let is_set =
+            |spec: crate::sampling::SamplerSpec| spec.order == Order::Shuffle && spec.points != Points::Uniform;
+        summary.samplers[i].spec().is_some_and(is_set)
+    };
     let best = (0..summary.samplers.len())
-        .filter(|&i| i != uniform)
+        .filter(|&i| i != uniform && is_shuffled(i))
         .filter_map(|i| Some((i, rmse_ratio(summary.cell(scene, i, spp)?, base)?)))
         .min_by(|a, b| a.1.value.total_cmp(&b.1.value))?;
     let star = star_against_uniform(summary, best.0);
@@ -209,8 +226,8 @@ fn helps(summary: &Summary, scene: usize) -> Option<String> {
         _ => "whether it helps cannot be told",
     };
     Some(format!(
-        "**Independent or correlated?** Only uniform's are independent. Within a set, points that keep apart are correlated: {words}. Smallest RMSE over uniform's in {} at \
-         {spp} spp: {} {} {ids}{} ({}).",
+        "**Independent or correlated?** Only uniform's are independent. Within a set, points that fill the square evenly are correlated: {words}. Smallest RMSE over uniform's in {} at \
+         {spp} spp, of the sets that each decision reads in an order of its own: {} {} {ids}{} ({}).",
         scene_name(summary, scene),
         name(summary, best.0),
         times(&best.1),

@@ -1,11 +1,12 @@
 //! What a budget of seconds buys: each sampler's error at equal seconds, and which sampler to take.
 
-use crate::stats::Estimate;
+use crate::stats::{Estimate, student_t_quantile};
 
-use super::super::evidence::{Answer, Limit, above, interpolated, ratio_of_roots};
+use super::super::evidence::{Answer, above, interpolated, ratio_of_roots};
 use super::super::markdown::{Page, table_ref};
 use super::super::numbers::{estimate, listed, short};
 use super::super::summarise::Summary;
+use super::flaws::flaws;
 use super::speed::timed;
 use super::tabulate;
 use super::words::{level, name, ratio_cell, same_as_cell, scene_name};
@@ -65,11 +66,28 @@ fn reached(summary: &Summary, scene: usize, seconds: f64) -> Vec<Reached> {
         .collect()
 }
 
-/// The smallest error of those reached, and the samplers that are not told apart from it.
-fn best(reached: &[Reached]) -> Option<(&Reached, Vec<usize>)> {
+/// By how much a 95 % interval from `replicates` widens, so that `comparisons` of them hold at once (Bonferroni): the ratio of
+/// Student's quantiles at 0.05/comparisons and 0.05, replicates − 1 degrees of freedom.
+fn joint_factor(replicates: u32, comparisons: usize) -> f64 {
+    let freedom = f64::from(replicates.max(2) - 1);
+    let quantile = |tests: f64| student_t_quantile(1.0 - 0.025 / tests, freedom);
+    quantile(comparisons.max(1) as f64) / quantile(1.0)
+}
+
+/// A ratio with the distances of its interval's ends, on a logarithmic scale, times `factor`.
+fn widened(ratio: &Estimate, factor: f64) -> Estimate {
+    let end = |end: f64| ratio.value * libm::pow(end / ratio.value, factor);
+    Estimate { value: ratio.value, ci95: ratio.ci95.map(|ends| ends.map(end)) }
+}
+
+/// The smallest error of those reached, and the samplers that are not told apart from it, at 5 % for all comparisons together.
+fn best(reached: &[Reached], replicates: u32) -> Option<(&Reached, Vec<usize>)> {
     let best = reached.iter().filter(|r| r.mse.value > 0.0).min_by(|a, b| a.mse.value.total_cmp(&b.mse.value))?;
-    let is_worse =
-        |r: &Reached| ratio_of_roots(&r.mse, &best.mse).is_some_and(|ratio| above(&ratio, 1.0) == Answer::Yes);
+    let factor = joint_factor(replicates, reached.len() - 1);
+    let is_worse = |r: &Reached| {
+        let ratio = ratio_of_roots(&r.mse, &best.mse);
+        ratio.is_some_and(|ratio| above(&widened(&ratio, factor), 1.0) == Answer::Yes)
+    };
     let alike = reached.iter().filter(|r| r.sampler != best.sampler && !is_worse(r)).map(|r| r.sampler).collect();
     Some((best, alike))
 }
@@ -133,33 +151,55 @@ fn choice(summary: &Summary, page: &mut Page) {
         let budgets: Vec<Budget> = counts.iter().filter_map(|&spp| budget(summary, scene, spp)).collect();
         for budget in &budgets {
             let all = reached(summary, scene, budget.seconds);
-            let Some((best, alike)) = best(&all) else { continue };
+            let sound: Vec<Reached> =
+                all.iter().filter(|r| flaws(summary, scene, r.sampler).is_empty()).cloned().collect();
+            let replicates = summary.about.experiment.replicates;
+            let Some((smallest, _)) = best(&all, replicates) else { continue };
+            let taken = best(&sound, replicates);
+            let over_uniform = |r: &Reached| match Some(r.sampler) == summary.uniform() {
+                true => "1".to_owned(),
+                false => ratio_cell(ratio_of_roots(&r.mse, &budget.base)),
+            };
+            let root = |r: &Reached| short(r.mse.value.max(0.0).sqrt());
             lines.push(vec![
                 scene_name(summary, scene),
                 format!("{} ({} spp)", short(budget.seconds), budget.spp),
-                marked(summary, scene, best.sampler),
-                short(best.mse.value.max(0.0).sqrt()),
-                if Some(best.sampler) == summary.uniform() {
-                    "1".to_owned()
-                } else {
-                    ratio_cell(ratio_of_roots(&best.mse, &budget.base))
+                taken.as_ref().map_or("none".to_owned(), |(r, _)| name(summary, r.sampler)),
+                taken.as_ref().map_or("–".to_owned(), |(r, _)| root(r)),
+                taken.as_ref().map_or("–".to_owned(), |(r, _)| over_uniform(r)),
+                match &taken {
+                    Some((_, alike)) if !alike.is_empty() => names(summary, alike),
+                    _ => "none".to_owned(),
                 },
-                if alike.is_empty() { "none".to_owned() } else { names(summary, scene, &alike) },
+                smaller_but_flawed(summary, scene, smallest),
             ]);
-            found.push(Found { seconds: budget.seconds, best: best.sampler, alike });
+            if let Some((taken, alike)) = taken {
+                found.push(Found { seconds: budget.seconds, best: taken.sampler, alike });
+            }
         }
-        words.extend(scene_words(summary, scene, &found));
+        let words_of_scene = scene_words(summary, scene, &found);
+        let none = || format!("in {} none: something speaks against each", scene_name(summary, scene));
+        words.extend(words_of_scene.or_else(|| (!budgets.is_empty()).then(none)));
     }
     if lines.is_empty() {
         return;
     }
-    let caption = "Which sampler for which budget: seconds that uniform sampling takes at the count in brackets, the smallest RMSE in W/(m² sr) reached in them, its ratio to \
-                   uniform sampling's with a 95 % interval, and the samplers whose RMSE is not told apart from it. ‡: in this scene it converges to a wrong image or stalls, so \
-                   a larger budget may not help it.";
-    let head = ["scene", "budget (s)", "smallest RMSE", "RMSE", "over uniform's", "not told apart from it"];
+    let caption = "Which sampler for which budget: seconds that uniform sampling takes at the count in brackets; of the samplers that nothing speaks against in the scene (no error that stays, no bias \
+                   seen, no neighbours that err alike, no set that decisions read in step or that is not randomised), the one with the smallest RMSE in W/(m² sr) reached in them, its ratio to uniform sampling's \
+                   with a 95 % interval, and those not told apart from it (5 % for all comparisons of a line together; the spread of the seconds is not in it); beside it the smallest RMSE of all, where that \
+                   is another's, with what speaks against it.";
+    let head = [
+        "scene",
+        "budget (s)",
+        "smallest sound RMSE",
+        "RMSE",
+        "over uniform's",
+        "not told apart from it",
+        "smaller, but",
+    ];
     tabulate(page, "budgets", caption, &head, &lines);
     page.paragraph(&format!(
-        "**Which sampler to take** ({}): {}. The smallest of many estimates is a little too small by being picked, and seconds are this machine's.",
+        "**Which sampler to take**, of those that nothing speaks against ({}): {}. The smallest of many estimates is a little too small by being picked, and seconds are this machine's.",
         table_ref("budgets"),
         words.join("; ")
     ));
@@ -179,15 +219,18 @@ impl Found {
     }
 }
 
-/// A sampler's name, with a sign where its error does not fall in the scene.
-fn marked(summary: &Summary, scene: usize, sampler: usize) -> String {
-    let limit = summary.course(scene, sampler).map(|course| course.limit());
-    let sign = if matches!(limit, Some(Limit::Wrong | Limit::Stalls)) { "‡" } else { "" };
-    format!("{}{sign}", name(summary, sampler))
+/// The smallest RMSE of all, where something speaks against its sampler; `–` where nothing does.
+fn smaller_but_flawed(summary: &Summary, scene: usize, smallest: &Reached) -> String {
+    let flaws = flaws(summary, scene, smallest.sampler);
+    if flaws.is_empty() {
+        return "–".to_owned();
+    }
+    let rmse = short(smallest.mse.value.max(0.0).sqrt());
+    format!("{} {rmse}: {}", name(summary, smallest.sampler), flaws.join(", "))
 }
 
-fn names(summary: &Summary, scene: usize, samplers: &[usize]) -> String {
-    listed(&samplers.iter().map(|&i| marked(summary, scene, i)).collect::<Vec<_>>())
+fn names(summary: &Summary, samplers: &[usize]) -> String {
+    listed(&samplers.iter().map(|&i| name(summary, i)).collect::<Vec<_>>())
 }
 
 /// One scene's conclusion: what is best, or not told apart from the best, at every budget; else what is at each.
@@ -197,20 +240,20 @@ fn scene_words(summary: &Summary, scene: usize, found: &[Found]) -> Option<Strin
     let mut always: Vec<usize> = std::iter::once(first.best).chain(first.alike.iter().copied()).collect();
     always.retain(|&sampler| rest.iter().all(|budget| budget.is_good(sampler)));
     always.sort_unstable();
-    let (budgets, many) = (found.len(), summary.samplers.len());
+    let (budgets, many) =
+        (found.len(), summary.compared(scene).filter(|&i| flaws(summary, scene, i).is_empty()).count());
     Some(match always.len() {
         0 => {
-            let each = found.iter().map(|b| format!("{} in {} s", marked(summary, scene, b.best), short(b.seconds)));
+            let each = found.iter().map(|b| format!("{} in {} s", name(summary, b.best), short(b.seconds)));
             format!("in {at} it depends on the budget: {}", listed(&each.collect::<Vec<_>>()))
         }
-        n if 2 * n > many => format!(
-            "in {at} it cannot be told: {n} of {many} samplers are the best or not told apart from it at every budget"
+        n if 2 * n > many && n > 2 => format!(
+            "in {at} it cannot be told: {n} of {many} of them are the best or not told apart from it at every budget"
         ),
-        _ if budgets == 1 => format!("in {at} {}", names(summary, scene, &always)),
-        _ => format!(
-            "in {at} {}, the best or not told apart from it at all {budgets} budgets",
-            names(summary, scene, &always)
-        ),
+        _ if budgets == 1 => format!("in {at} {}", names(summary, &always)),
+        _ => {
+            format!("in {at} {}, the best or not told apart from it at all {budgets} budgets", names(summary, &always))
+        }
     })
 }
 
@@ -225,8 +268,21 @@ mod tests {
     #[test]
     fn what_overlaps_the_best_is_not_told_apart_from_it_and_what_does_not_is() {
         let all = [at(0, 4.0, 0.1), at(1, 1.0, 0.1), at(2, 1.05, 0.1)];
-        let (best, alike) = best(&all).unwrap();
+        let (best, alike) = best(&all, 8).unwrap();
         assert_eq!((best.sampler, alike), (1, vec![2]));
-        assert_eq!(super::best(&[at(0, -1.0, 0.1)]), None, "an error below the reference's noise ranks nothing");
+        assert_eq!(super::best(&[at(0, -1.0, 0.1)], 8), None, "an error below the reference's noise ranks nothing");
+    }
+
+    /// Student's t with 7 degrees of freedom: 2.3646 at 5 %, 4.0293 at 0.5 % (two-sided; tables).
+    #[test]
+    fn many_comparisons_ask_for_more_distance() {
+        assert!((joint_factor(8, 10) - 4.0293 / 2.3646).abs() < 1e-4 && joint_factor(8, 1) == 1.0);
+        let ratio = widened(&Estimate { value: 1.0, ci95: Some([0.5, 2.0]) }, 2.0);
+        assert!(ratio.ci95.is_some_and(|[low, high]| (low - 0.25).abs() < 1e-15 && (high - 4.0).abs() < 1e-14));
+        // Two at a ratio of RMSE of about 1.12 [1.02, 1.23]: told apart alone, not among nine others.
+        let pair = [at(0, 1.0, 0.1), at(1, 1.26, 0.15)];
+        assert_eq!(super::best(&pair, 8).unwrap().1, Vec::<usize>::new());
+        let many: Vec<Reached> = pair.into_iter().chain((2..10).map(|i| at(i, 9.0, 0.1))).collect();
+        assert_eq!(super::best(&many, 8).unwrap().1, [1]);
     }
 }

@@ -1,10 +1,10 @@
 //! Convergence, and what part of the error is bias.
 
-use crate::stats::{Estimate, IntervalKind};
+use crate::stats::{Estimate, IntervalKind, LACK_OF_FIT_LEVEL, LEAST_RESIDUAL};
 
 use super::super::evidence::{Answer, above, below};
 use super::super::markdown::{Page, link_to, table_ref};
-use super::super::numbers::{counted, estimate, listed, percent, short, signed_estimate};
+use super::super::numbers::{counted, estimate, listed, percent, short, slope_text, with_interval};
 use super::super::summarise::{SLOPE_COUNTS, Slope, Summary};
 use super::super::write::Figures;
 use super::reference;
@@ -18,7 +18,23 @@ const INDEPENDENT: f64 = -0.5;
 fn slope_cell(slope: Option<&Slope>) -> String {
     let Some(fit) = slope.and_then(|slope| slope.fit.as_ref()) else { return "–".to_owned() };
     let star = if fit.interval == IntervalKind::Residuals { "*" } else { "" };
-    format!("{}{star} ({})", signed_estimate(&slope_estimate(fit)), fit.points)
+    format!("{}{star} ({})", with_interval(&slope_estimate(fit), slope_text), fit.points)
+}
+
+/// [`slope_cell`], or that there is no one slope and what the last step's is.
+fn power_cell(summary: &Summary, scene: usize, sampler: usize) -> String {
+    let slope = summary.slope(scene, sampler);
+    if !is_no_power_law(slope) {
+        return slope_cell(slope);
+    }
+    let last = summary.last_step(scene, sampler);
+    let last = last
+        .map(|step| format!("; from {} to {} spp {}", step.from, step.to, with_interval(&step.slope(), slope_text)));
+    format!("no power law{}", last.unwrap_or_default())
+}
+
+fn is_no_power_law(slope: Option<&Slope>) -> bool {
+    slope.and_then(|slope| slope.fit.as_ref()).is_some_and(crate::stats::SlopeFit::is_no_power_law)
 }
 
 fn slope_estimate(fit: &crate::stats::SlopeFit) -> Estimate {
@@ -41,15 +57,18 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
     let lines: Vec<Vec<String>> = (0..summary.samplers.len())
         .map(|sampler| {
             let cells = (0..summary.scenes.len()).map(|scene| {
-                same_as_cell(summary, scene, sampler).unwrap_or_else(|| slope_cell(summary.slope(scene, sampler)))
+                same_as_cell(summary, scene, sampler).unwrap_or_else(|| power_cell(summary, scene, sampler))
             });
             std::iter::once(name(summary, sampler)).chain(cells).collect()
         })
         .collect();
     let (low, high) = (SLOPE_COUNTS.start(), SLOPE_COUNTS.end());
     let caption = format!(
-        "Slope of log RMSE in log spp (no unit), powers of two from {low} to {high} that the sampler takes as asked, in brackets the number of counts fitted; {}.",
-        level(summary)
+        "Slope of log RMSE in log spp (no unit), powers of two from {low} to {high} that the sampler takes as asked, in round brackets the number of counts fitted; {}. \"No power law\": the points are no line (lack-of-fit test at {}, \
+         and one lies more than {} off), so the slope of the last step is given instead.",
+        level(summary),
+        percent(LACK_OF_FIT_LEVEL),
+        percent(LEAST_RESIDUAL)
     );
     tabulate(page, "slopes", &caption, &head, &lines);
     let starred =
@@ -75,9 +94,14 @@ fn slope_sentence(summary: &Summary, scene: usize) -> Option<String> {
     let mut steeper = Vec::new();
     let mut flatter = Vec::new();
     let mut neither = Vec::new();
+    let mut curved = Vec::new();
     for sampler in 0..summary.samplers.len() {
         let Some(fit) = summary.slope(scene, sampler).and_then(|slope| slope.fit.as_ref()) else { continue };
         let slope = slope_estimate(fit);
+        if fit.is_no_power_law() {
+            curved.push(name(summary, sampler));
+            continue;
+        }
         match (below(&slope, INDEPENDENT), above(&slope, INDEPENDENT)) {
             (Answer::Yes, _) => steeper.push(name(summary, sampler)),
             (_, Answer::Yes) => flatter.push(name(summary, sampler)),
@@ -91,6 +115,7 @@ fn slope_sentence(summary: &Summary, scene: usize) -> Option<String> {
         part(&steeper, "steeper than independent samples' −1/2 with the whole interval:"),
         part(&flatter, "flatter:"),
         part(&neither, "not told apart from it:"),
+        part(&curved, "no power law, so not ranked:"),
     ]
     .into_iter()
     .flatten()

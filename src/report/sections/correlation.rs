@@ -1,10 +1,9 @@
 //! Decisions in step, and one pattern in every pixel.
 
 use crate::experiment::spec::Pictures;
-use crate::sampling::{Order, Random, SamplerSpec, Scope};
-use crate::stats::Estimate;
+use crate::sampling::{Order, Points, Random, SamplerSpec, Scope};
 
-use super::super::evidence::{Answer, Limit, above, below, ratio};
+use super::super::evidence::{Answer, Limit, above, below, is_biased, ratio};
 use super::super::markdown::{Page, link_to};
 use super::super::numbers::{estimate, listed, percent, short, signed, signed_estimate};
 use super::super::pairing;
@@ -12,8 +11,8 @@ use super::super::shots::{PictureSet, Shot};
 use super::super::summarise::{Cell, Summary};
 use super::reference;
 use super::words::{
-    against_one, bias_words, estimate_cell, level, limit_words, marked_row, name, ratio_cell, rmse_ratio, row, rows,
-    scene_name, scenes_by_lens, times,
+    against_one, bias_short, bias_words, estimate_cell, level, limit_words, marked_row, name, ratio_cell, rmse_ratio,
+    row, rows, scene_name, scenes_by_lens, times,
 };
 use super::{tabulate, tabulate_folded, titles};
 
@@ -145,7 +144,7 @@ fn literal_row(summary: &Summary, scene: usize, sheet: usize, best: usize) -> Op
     let gain = rmse_ratio(literal, cured);
     let verdict = match gain.as_ref().map(against_one) {
         Some("more") => "kept apart is better",
-        Some("less") => "kept apart is no cure",
+        Some("less") => "in step is better here",
         _ => "cannot tell",
     };
     Some(vec![
@@ -229,6 +228,12 @@ pub fn literal_sentence(summary: &Summary, scene: usize, sheet: usize, best: usi
                 "**{sheet_name} stalls in {at}**: from {from} to {to} spp its RMSE stays at {kept} of what it was{variance}; {bias}"
             )
         }
+        Limit::StallsBiased => format!(
+            "**{sheet_name} stalls in {at}, and is biased**: from {from} to {to} spp its RMSE stays at {kept} of what it was, its variance at {} and its bias² at {}; {bias}. \
+             It converges to no image",
+            ratio_cell(course.variance_ratio),
+            ratio_cell(course.bias2_ratio)
+        ),
         Limit::Falls | Limit::Unclear => return None,
     };
     Some(format!("{what}. {} {}", cure_words(literal, cured, &name(summary, best)), rows(&[literal, cured])))
@@ -249,31 +254,57 @@ fn cure_words(literal: &Cell, cured: &Cell, best_name: &str) -> String {
     }
 }
 
-/// Which wrong limits and stalls shuffling alone cures: the cure reads the same set, in an order of its own for each decision.
+/// Whether `b` is `a` but for the order in which decisions read the set: only then can the order be named as the cause.
+///
+/// That a preset of the sheet has 1-D samplers of its own counts as a difference unless it is of the same kind: jittered
+/// strata, in a shuffled order.
+pub fn differs_in_order_alone(a: &SamplerSpec, b: &SamplerSpec) -> bool {
+    let strata = a.points == Points::Stratified;
+    a.order != b.order
+        && (a.points, a.random, a.scope) == (b.points, b.random, b.scope)
+        && (strata || a.sheet_1d == b.sheet_1d)
+}
+
+/// What failing literal readings a shuffle cures, and whether it is the shuffle alone that differs.
 fn shuffle_sentence(summary: &Summary, scene: usize, pairs: &[(usize, usize)]) -> Option<String> {
     let limit = |sampler: usize| summary.course(scene, sampler).map(|course| course.limit());
-    let shuffled =
-        |&&(_, best): &&(usize, usize)| summary.samplers[best].spec().is_some_and(|s| s.order == Order::Shuffle);
-    let cured = |wanted: Limit| -> Vec<String> {
-        let is_cured = |&&(sheet, best): &&(usize, usize)| {
-            let unbiased = summary.course(scene, best).is_some_and(|course| course.is_biased() == Answer::No);
-            limit(sheet) == Some(wanted) && limit(best) == Some(Limit::Falls) && unbiased
-        };
-        pairs.iter().filter(shuffled).filter(is_cured).map(|&(_, best)| name(summary, best)).collect()
+    let fails = |sampler: usize| {
+        matches!(limit(sampler), Some(Limit::Wrong | Limit::Stalls | Limit::StallsBiased)).then_some(sampler)
     };
-    let parts: Vec<String> = [(Limit::Wrong, "the wrong limit"), (Limit::Stalls, "the stall")]
-        .into_iter()
-        .map(|(wanted, words)| (cured(wanted), words))
-        .filter(|(best, _)| !best.is_empty())
-        .map(|(best, words)| format!("{words} (under {} the error falls and no bias is seen)", listed(&best)))
-        .collect();
-    (!parts.is_empty()).then(|| {
+    let is_right = |&sampler: &usize| {
+        let unbiased = summary.course(scene, sampler).is_some_and(|course| course.is_biased() == Answer::No);
+        limit(sampler) == Some(Limit::Falls) && unbiased
+    };
+    let (mut alone, mut together) = (Vec::new(), Vec::new());
+    for &(sheet, best) in pairs {
+        let Some((sheet, spec)) = fails(sheet).zip(summary.samplers[sheet].spec()) else { continue };
+        let is_shuffled =
+            |&sampler: &usize| summary.samplers[sampler].spec().is_some_and(|s| s.order == Order::Shuffle);
+        let same_but_order = |&sampler: &usize| {
+            summary.samplers[sampler].spec().is_some_and(|other| differs_in_order_alone(&spec, &other))
+        };
+        let shuffled = (0..summary.samplers.len()).filter(is_shuffled).filter(is_right);
+        let told = |cure: usize| format!("{} against {}", name(summary, cure), name(summary, sheet));
+        match shuffled.clone().find(same_but_order) {
+            Some(cure) => alone.push(told(cure)),
+            None => together.extend(shuffled.into_iter().find(|&cure| cure == best).map(told)),
+        }
+    }
+    let at = scene_name(summary, scene);
+    let alone = (!alone.is_empty()).then(|| {
         format!(
-            "**In {} shuffling cures {}**: the same points, in an order of its own for each decision.",
-            scene_name(summary, scene),
-            parts.join(" and ")
+            "**In {at} shuffling alone cures**: {}: the same points, in an order of its own for each decision; the error falls and no bias is seen.",
+            listed(&alone)
         )
-    })
+    });
+    let together = (!together.is_empty()).then(|| {
+        format!(
+            "In {at} a shuffle with another randomisation cures, too: {}; which of the two changes does it cannot be told from these samplers.",
+            listed(&together)
+        )
+    });
+    let both: Vec<String> = [alone, together].into_iter().flatten().collect();
+    (!both.is_empty()).then(|| both.join(" "))
 }
 
 /// Uniform sampling as the control: its decisions are independent however they march.
@@ -321,17 +352,55 @@ pub struct Pattern<'a> {
     pub cell: &'a Cell,
     /// The twin's cell.
     pub other: &'a Cell,
+    /// Number of pixels of their images.
+    pub pixels: u64,
+}
+
+/// The interval of a correlation; that of one image of a sampler without randomness is ±1.96/√(2 · pixels), the spread that
+/// independent errors in as many pairs of neighbours would have.
+fn rho_interval(cell: &Cell, pixels: u64) -> Option<[f64; 2]> {
+    let rho = cell.error_autocorrelation?;
+    let half = 1.96 / (2.0 * pixels as f64).sqrt();
+    rho.ci95.or((cell.is_fixed && pixels > 0).then_some([rho.value - half, rho.value + half]))
+}
+
+/// Correlations below this are called no structure, however sure they are.
+pub const LEAST_RHO: f64 = 0.03;
+
+/// Errors of neighbours that clearly go together.
+pub struct Structure<'a> {
+    /// The cell of the count with the largest ρ of those where it is clear.
+    pub cell: &'a Cell,
+    /// Whether the sampler repeats its points, or an axis of them, in every pixel: else the pattern is not the cause.
+    pub repeats: bool,
+}
+
+/// Whether a correlation is clearly there: 0 more than twice as far from it as its interval's end, at least [`LEAST_RHO`],
+/// and above the interval of uniform sampling's, where that was measured.
+pub fn is_clear_structure(rho: f64, interval: Option<[f64; 2]>, uniform: Option<[f64; 2]>) -> bool {
+    let is_above = |low: f64| uniform.is_none_or(|[_, high]| low > high);
+    rho >= LEAST_RHO && interval.is_some_and(|[low, _]| low > 0.5 * rho && is_above(low))
+}
+
+/// Do neighbours err alike under a sampler in a scene, at the count of [`pattern_spp`], the middle or the largest one?
+pub fn structure(summary: &Summary, scene: usize, sampler: usize) -> Option<Structure<'_>> {
+    let pixels = summary.scenes[scene].pixels;
+    let counts = [pattern_spp(summary), summary.middle_spp(), summary.most_spp()];
+    let uniform = |spp: u32| {
+        let base = summary.uniform().filter(|&uniform| uniform != sampler)?;
+        rho_interval(summary.cell(scene, base, spp)?, pixels)
+    };
+    let rho = |cell: &Cell| cell.error_autocorrelation.map_or(0.0, |rho| rho.value);
+    let clear = |cell: &&Cell| is_clear_structure(rho(cell), rho_interval(cell, pixels), uniform(cell.spp.asked));
+    let cells = counts.into_iter().flatten().filter_map(|spp| summary.cell(scene, sampler, spp));
+    let cell = cells.filter(clear).max_by(|a, b| rho(a).total_cmp(&rho(b)))?;
+    Some(Structure { cell, repeats: summary.samplers[sampler].repeats_in_every_pixel() })
 }
 
 impl Pattern<'_> {
-    /// Do neighbouring pixels err more alike than under the twin? By intervals that do not meet; a single image of a
-    /// sampler without randomness is compared as it is.
+    /// Do neighbouring pixels err more alike than under the twin? By intervals that do not meet, see [`rho_interval`].
     pub fn errs_alike(&self) -> Answer {
-        let (Some(rho), Some(other)) = (self.cell.error_autocorrelation, self.other.error_autocorrelation) else {
-            return Answer::CannotTell;
-        };
-        let ends = |e: &Estimate, fixed: bool| e.ci95.or(fixed.then_some([e.value; 2]));
-        match (ends(&rho, self.cell.is_fixed), ends(&other, self.other.is_fixed)) {
+        match (rho_interval(self.cell, self.pixels), rho_interval(self.other, self.pixels)) {
             (Some([low, _]), Some([_, high])) if low > high => Answer::Yes,
             (Some([_, high]), Some([low, _])) if high < low => Answer::No,
             _ => Answer::CannotTell,
@@ -358,6 +427,7 @@ pub fn patterns(summary: &Summary, scene: usize) -> Vec<Pattern<'_>> {
                 twin,
                 cell: summary.cell(scene, sampler, spp)?,
                 other: summary.cell(scene, twin, spp)?,
+                pixels: summary.scenes[scene].pixels,
             })
         })
         .collect()
@@ -378,6 +448,7 @@ pub fn between_pixels(summary: &Summary, page: &mut Page) {
         page.paragraph("No sampler of this experiment shows every pixel the same points beside one that does not.");
     }
     page.sentences(&pattern_sentences(summary, &all));
+    page.sentences(&[structure_sentence(summary).unwrap_or_default()]);
     pattern_table(summary, spp, &all, page);
     picture_correlations(summary, page);
     neighbours_table(summary, spp, page);
@@ -439,6 +510,37 @@ fn pattern_sentences(summary: &Summary, all: &[(usize, Pattern)]) -> Vec<String>
     .collect()
 }
 
+/// Who errs alike without a pattern that repeats, and why.
+fn structure_sentence(summary: &Summary) -> Option<String> {
+    let all: Vec<(usize, usize, Structure)> = (0..summary.scenes.len())
+        .flat_map(|scene| (0..summary.samplers.len()).map(move |sampler| (scene, sampler)))
+        .filter_map(|(scene, sampler)| Some((scene, sampler, structure(summary, scene, sampler)?)))
+        .filter(|(.., found)| !found.repeats)
+        .collect();
+    let is_shared_bias = |(_, sampler, found): &(usize, usize, Structure)| {
+        let in_step = summary.samplers[*sampler].spec().is_some_and(|spec| spec.order == Order::Step);
+        in_step && is_biased(&found.cell.bias2) == Answer::Yes
+    };
+    let why = match all.iter().all(is_shared_bias) {
+        true => " A bias of decisions in step varies slowly over the picture, so neighbours share it.",
+        false => "",
+    };
+    let told = all.iter().map(|(scene, sampler, found)| {
+        let rho = found.cell.error_autocorrelation.map_or("undefined".to_owned(), |rho| signed_estimate(&rho));
+        format!(
+            "{} in {} (ρ = {rho} at {} spp; {})",
+            name(summary, *sampler),
+            scene_name(summary, *scene),
+            found.cell.spp.asked,
+            bias_short(found.cell)
+        )
+    });
+    let told: Vec<String> = told.collect();
+    (!told.is_empty()).then(|| {
+        format!("New points in each pixel are no protection: neighbours also err alike under {}.{why}", listed(&told))
+    })
+}
+
 /// One pattern in every pixel beside a new one in each: one line a sampler and scene.
 fn pattern_table(summary: &Summary, spp: u32, all: &[(usize, Pattern)], page: &mut Page) {
     let rho = |cell: &Cell| cell.error_autocorrelation.map_or("undefined".to_owned(), |rho| signed_estimate(&rho));
@@ -466,7 +568,8 @@ fn pattern_table(summary: &Summary, spp: u32, all: &[(usize, Pattern)], page: &m
         .collect();
     let caption = format!(
         "Samplers that show every pixel the same points, or one axis of them, beside the nearest that does not, at {spp} spp: correlation ρ of neighbouring pixels' errors (no unit), \
-         whether neighbours err more alike, the ratio of the two RMSE, and whether decisions march in step, which makes neighbours err alike, too; {}.",
+         whether neighbours err more alike, the ratio of the two RMSE, and whether decisions march in step, which makes neighbours err alike, too; {}. One image of a sampler without randomness is compared by ±1.96/√(2 · pixels), the spread of ρ \
+         under independent errors.",
         level(summary)
     );
     let head =
@@ -504,4 +607,28 @@ fn picture_correlations(summary: &Summary, page: &mut Page) {
 fn spread(values: &[f64]) -> Option<f64> {
     let moments: crate::stats::Moments = values.iter().copied().collect();
     moments.std()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn order_is_named_as_the_cause_only_where_nothing_else_differs() {
+        let spec = |text: &str| SamplerSpec::parse(text, crate::sampling::Preset::Best).unwrap();
+        assert!(differs_in_order_alone(&spec("stratified:sheet"), &spec("stratified:best")));
+        assert!(differs_in_order_alone(&spec("ld:step:xor@each"), &spec("ld:shuffle:xor@each")));
+        assert!(!differs_in_order_alone(&spec("ld:sheet"), &spec("ld:best")), "xor and Owen's scramble");
+        assert!(!differs_in_order_alone(&spec("hammersley:sheet"), &spec("hammersley:best")));
+        assert!(!differs_in_order_alone(&spec("ld:best"), &spec("ld:best")));
+    }
+
+    #[test]
+    fn structure_is_called_only_where_it_is_clear() {
+        let clear = |rho, half: f64, uniform| is_clear_structure(rho, Some([rho - half, rho + half]), uniform);
+        assert!(clear(0.071, 0.007, Some([-0.01, 0.01])) && clear(0.071, 0.007, None));
+        assert!(!clear(0.071, 0.04, None), "0 is less than twice as far as the interval's end");
+        assert!(!clear(0.02, 0.001, None), "sure, but nothing to see");
+        assert!(!clear(0.071, 0.007, Some([0.0, 0.07])) && !is_clear_structure(0.9, None, None));
+    }
 }

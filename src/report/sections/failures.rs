@@ -2,11 +2,13 @@
 
 use crate::stats::Estimate;
 
-use super::super::evidence::{Answer, Limit, below, clearly_above_one, interpolated, ratio_of_roots};
+use super::super::evidence::{
+    Answer, Limit, clearly_above_one, clearly_below_one, interpolated, is_biased, ratio_of_roots,
+};
 use super::super::markdown::{Page, link_to};
 use super::super::numbers::{counted, estimate, percent, signed_estimate};
-use super::super::summarise::{Cell, Summary};
-use super::correlation::{Pattern, pattern_spp, patterns};
+use super::super::summarise::{Cell, Step, Summary};
+use super::correlation::{Structure, pattern_spp, structure};
 use super::speed::efficiency;
 use super::words::{
     bias_words, level, limit_words, marked_row, name, ratio_cell, rmse_ratio, same_as_cell, scene_name, times,
@@ -44,22 +46,21 @@ pub fn section(summary: &Summary, page: &mut Page) {
         .collect();
     let mut lines: Vec<Vec<String>> =
         pairs.iter().filter_map(|&(scene, sampler)| course_failure(summary, scene, sampler)).collect();
-    for scene in 0..summary.scenes.len() {
-        let alike = patterns(summary, scene);
-        lines
-            .extend(alike.iter().filter(|p| p.errs_alike() == Answer::Yes).map(|p| pattern_failure(summary, scene, p)));
-    }
+    lines.extend(pairs.iter().filter_map(|&(scene, sampler)| {
+        structure(summary, scene, sampler).map(|found| structure_failure(summary, scene, sampler, &found))
+    }));
     lines.extend(pairs.iter().filter_map(|&(scene, sampler)| odd_failure(summary, scene, sampler)));
     if lines.is_empty() {
-        page.paragraph("No failure is seen in these rows: no error stays, no bias is seen, no neighbours err alike, no odd count costs accuracy.");
+        page.paragraph("No failure is seen in these rows: no error stays, no bias is seen, no neighbours err alike, no count between powers of two costs accuracy.");
     }
     let caption = format!(
-        "Every failure that the rows show: what happens, and the number that says so (bias² in (W/(m² sr))²); {}. The counts of a verdict are in {}.",
+        "Failures that the rows of the plain images show: what happens, and the number that says so (bias² in (W/(m² sr))²); {}. The counts of a verdict are in {}. What has nothing random in it \
+         is all bias and is not listed for that alone; a sample more or less, two passes and scale are in {}.",
         level(summary),
-        link_to(titles::READING)
+        link_to(titles::READING),
+        link_to(titles::STABILITY)
     );
     tabulate(page, "failures", &caption, &["failure", "sampler", "scene", "measured", "row"], &lines);
-    stability(summary, page);
 }
 
 /// A wrong limit, a stall, or a bias beside a falling error.
@@ -67,7 +68,7 @@ fn course_failure(summary: &Summary, scene: usize, sampler: usize) -> Option<Vec
     let (from, to) = summary.course_counts()?;
     let (course, cell) = (summary.course(scene, sampler)?, summary.cell(scene, sampler, to)?);
     let is_failure = match course.limit() {
-        Limit::Wrong | Limit::Stalls => true,
+        Limit::Wrong | Limit::Stalls | Limit::StallsBiased => true,
         // What has nothing random in it is all bias, and says so elsewhere.
         Limit::Falls => course.is_biased() == Answer::Yes && !cell.is_fixed,
         Limit::Unclear => false,
@@ -84,15 +85,20 @@ fn course_failure(summary: &Summary, scene: usize, sampler: usize) -> Option<Vec
     })
 }
 
-/// One pattern in every pixel that makes neighbours err alike.
-fn pattern_failure(summary: &Summary, scene: usize, pattern: &Pattern) -> Vec<String> {
-    let rho = pattern.cell.error_autocorrelation.map_or("undefined".to_owned(), |rho| signed_estimate(&rho));
+/// Neighbours that err alike, by one pattern in every pixel or by a bias that they share.
+fn structure_failure(summary: &Summary, scene: usize, sampler: usize, found: &Structure) -> Vec<String> {
+    let rho = found.cell.error_autocorrelation.map_or("undefined".to_owned(), |rho| signed_estimate(&rho));
+    let what = match (found.repeats, is_biased(&found.cell.bias2)) {
+        (true, _) => "structure instead of noise",
+        (false, Answer::Yes) => "neighbours share a bias (points are new in each pixel)",
+        (false, _) => "neighbours err alike, though points are new in each pixel",
+    };
     vec![
-        "structure instead of noise".to_owned(),
-        name(summary, pattern.sampler),
+        what.to_owned(),
+        name(summary, sampler),
         scene_name(summary, scene),
-        format!("ρ = {rho} at {} spp", pattern.cell.spp.asked),
-        marked_row(pattern.cell),
+        format!("ρ = {rho} at {} spp", found.cell.spp.asked),
+        marked_row(found.cell),
     ]
 }
 
@@ -100,7 +106,7 @@ fn odd_failure(summary: &Summary, scene: usize, sampler: usize) -> Option<Vec<St
     let odd = odd_count(summary, scene, sampler).filter(|odd| clearly_above_one(&odd.ratio))?;
     let cell = summary.cell(scene, sampler, odd.asked)?;
     Some(vec![
-        format!("an odd count costs accuracy: {} spp", odd.asked),
+        format!("a count that is no power of two costs accuracy: {} spp", odd.asked),
         name(summary, sampler),
         scene_name(summary, scene),
         format!(
@@ -112,36 +118,10 @@ fn odd_failure(summary: &Summary, scene: usize, sampler: usize) -> Option<Vec<St
     ])
 }
 
-/// How far replicates are apart.
-fn stability(summary: &Summary, page: &mut Page) {
-    let Some(spp) = summary.middle_spp() else { return };
-    let spread = |cell: &Cell| -> Option<f64> {
-        let (low, high) = cell.replicate_mse.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), &m| (l.min(m), h.max(m)));
-        (cell.replicate_mse.len() > 1 && low > 0.0).then(|| (high / low).sqrt())
-    };
-    let lines: Vec<Vec<String>> = (0..summary.samplers.len())
-        .map(|sampler| {
-            let cells = (0..summary.scenes.len()).map(|scene| match summary.cell(scene, sampler, spp) {
-                None => same_as_cell(summary, scene, sampler).unwrap_or("missing".to_owned()),
-                Some(cell) if cell.is_fixed => "nothing random".to_owned(),
-                Some(cell) => spread(cell).map_or("–".to_owned(), |s| format!("{s:.2}")),
-            });
-            std::iter::once(name(summary, sampler)).chain(cells).collect()
-        })
-        .collect();
-    let mut head = vec!["sampler".to_owned()];
-    head.extend((0..summary.scenes.len()).map(|scene| scene_name(summary, scene)));
-    let caption = format!(
-        "How stable each is from one randomisation to the next: largest over smallest RMSE of {} at {spp} spp (no unit).",
-        counted(summary.about.experiment.replicates as usize, "replicate", "replicates")
-    );
-    tabulate(page, "spread", &caption, &head, &lines);
-}
-
 /// The table of advantages and disadvantages: every cell a measured predicate.
 pub fn table(summary: &Summary, page: &mut Page) {
     page.heading(2, titles::TABLE);
-    page.paragraph("Every cell is computed from rows; none is an opinion. \"yes\" below: the error falls and no bias is seen, within the interval given.");
+    page.paragraph("Every cell is computed from rows; none is an opinion. \"no bias seen\" below is no proof that the image becomes the right one: it bounds the bias at the largest count.");
     let scenes: Vec<String> = (0..summary.scenes.len()).map(|scene| scene_name(summary, scene)).collect();
     let per_scene = |key: &str, caption: String, cell: &dyn Fn(usize, usize) -> String, page: &mut Page| {
         let mut head = vec!["sampler".to_owned()];
@@ -157,7 +137,9 @@ pub fn table(summary: &Summary, page: &mut Page) {
     };
     if let Some((_, to)) = summary.course_counts() {
         let caption = format!(
-            "Does it converge to the right image? In brackets bias² in (W/(m² sr))² at {to} spp; {}.",
+            "Does it converge to the right image? Never a \"yes\": the rows end at {to} spp. Where no bias is seen, the most that it can be, as a share of the MSE (the interval's upper end); \"not \
+             promised\" where the construction allows a wrong limit all the same; \"flattens\" where the last step's error falls less than that of independent samples. In brackets bias² in \
+             (W/(m² sr))²; {}.",
             level(summary)
         );
         per_scene("right-image", caption, &|scene, sampler| right_image(summary, scene, sampler, to), page);
@@ -180,14 +162,31 @@ fn right_image(summary: &Summary, scene: usize, sampler: usize, to: u32) -> Stri
         return "cannot tell".to_owned();
     };
     let word = match (course.limit(), course.is_biased()) {
-        (Limit::Wrong, _) => "no",
-        (Limit::Stalls, _) => "no bias seen, but it stalls",
-        (Limit::Falls, Answer::No) => "yes",
-        (Limit::Falls, Answer::Yes) if cell.is_fixed => "its error falls (all of it bias)",
-        (Limit::Falls, Answer::Yes) => "its error falls, but it is biased",
-        _ => "cannot tell",
+        (Limit::Wrong, _) => "no".to_owned(),
+        (Limit::StallsBiased, _) => "no: it stalls, and is biased".to_owned(),
+        (Limit::Stalls, _) => "no bias seen, but it stalls".to_owned(),
+        (Limit::Falls, Answer::No) => {
+            let unproven = summary.samplers[sampler].unproven(&summary.scenes[scene].decisions);
+            let flattens = summary.last_step(scene, sampler).filter(Step::is_flatter_than_independent);
+            falling_words(cell, to, unproven, flattens.as_ref())
+        }
+        (Limit::Falls, Answer::Yes) if cell.is_fixed => "its error falls (all of it bias)".to_owned(),
+        (Limit::Falls, Answer::Yes) => "its error falls, but it is biased".to_owned(),
+        _ => "cannot tell".to_owned(),
     };
     format!("{word} ({}){}", estimate(&cell.bias2), reference::mark(cell))
+}
+
+/// What can be said of an error that falls without a bias that is seen: how large one could be, whether the construction
+/// promises that there is none, and whether the fall ends.
+fn falling_words(cell: &Cell, to: u32, unproven: Option<&str>, flattens: Option<&Step>) -> String {
+    let most = cell.bias2.ci95.filter(|_| cell.mse.value > 0.0).map(|[_, high]| high.max(0.0) / cell.mse.value);
+    let most = most.map_or(String::new(), |share| format!(", at most {} of the MSE", percent(share.min(1.0))));
+    let unproven = unproven.map_or(String::new(), |why| format!("; not promised: {why}"));
+    let flattens = flattens.map_or(String::new(), |step| {
+        format!("; flattens: RMSE {} / {} = {}", step.to, step.from, times(&step.rmse_ratio))
+    });
+    format!("no bias seen up to {to} spp{most}{unproven}{flattens}")
 }
 
 fn against_uniform(summary: &Summary, scene: usize, sampler: usize, uniform: usize, spp: u32) -> String {
@@ -199,7 +198,7 @@ fn against_uniform(summary: &Summary, scene: usize, sampler: usize, uniform: usi
     format!("{}{mark}", ratio_cell(cells.and_then(|(own, base)| rmse_ratio(own, base))))
 }
 
-/// What is one number a sampler: odd counts, randomness, neighbours, efficiency.
+/// What is one number a sampler: counts between powers of two, randomness, neighbours, efficiency.
 fn others(summary: &Summary, page: &mut Page) {
     let Some(scene) = super::words::main_scene(summary) else { return };
     let at = scene_name(summary, scene);
@@ -210,9 +209,9 @@ fn others(summary: &Summary, page: &mut Page) {
         .map(|sampler| {
             let odd = odd_count(summary, scene, sampler);
             let works = odd.as_ref().map_or("–".to_owned(), |odd| {
-                let word = match (clearly_above_one(&odd.ratio), below(&odd.ratio, 1.0)) {
+                let word = match (clearly_above_one(&odd.ratio), clearly_below_one(&odd.ratio)) {
                     (true, _) => "worse than promised",
-                    (_, Answer::Yes) => "better than promised",
+                    (_, true) => "better than promised",
                     _ => "as promised, or cannot tell",
                 };
                 format!("{word}: {} ({} taken)", times(&odd.ratio), odd.taken)
@@ -235,14 +234,15 @@ fn others(summary: &Summary, page: &mut Page) {
         "sampler".to_owned(),
         format!(
             "RMSE at {} spp / that promised by its neighbours",
-            odd_asked.map_or("an odd count of".to_owned(), |n| n.to_string())
+            odd_asked.map_or("some".to_owned(), |n| n.to_string())
         ),
         "replicates differ".to_owned(),
         format!("ρ of neighbours, {} spp", pattern.unwrap_or(0)),
         "1/(MSE · T), relative to uniform (this machine)".to_owned(),
     ];
     let caption = format!(
-        "What else tells them apart, in {at}: odd counts, randomness, correlation ρ of neighbouring pixels' errors, and efficiency at {} spp (T: seconds × threads; above 1 is better); {}.",
+        "What else tells them apart, in {at}: counts that are no power of two (better or worse where 1 is more than twice as far as the interval's end), randomness, correlation ρ of neighbouring pixels' errors, \
+         and efficiency at {} spp (T: seconds × threads; above 1 is better); {}; the efficiency's ends join the range of T with the 95 % interval of the MSE, so they are no 95 % interval.",
         summary.middle_spp().unwrap_or(0),
         level(summary)
     );
@@ -269,7 +269,7 @@ pub fn limits(summary: &Summary, page: &mut Page) {
         1 => "One replicate: no variance, and no interval that holds a sampler's own randomness.".to_owned(),
         n => format!(
             "{n} replicates: an interval's own width is good to about {} (relative standard error of a variance √(2/(R − 1)), halved for a width); \
-             with so many intervals in this report some miss their truth by chance, one in twenty by design. The verdicts \"biased\" and \"worse than promised\" ask for twice the distance for that reason.",
+             with so many intervals in this report some miss their truth by chance, one in twenty by design. The verdicts \"biased\", \"structure\", \"worse\" and \"better than promised\" ask for twice the distance for that reason.",
             percent((2.0 / (f64::from(n) - 1.0)).sqrt() / 2.0)
         ),
     });
@@ -284,12 +284,57 @@ pub fn limits(summary: &Summary, page: &mut Page) {
     }
     let shots: usize = summary.pictured.iter().map(|set| set.shots.len()).sum();
     if shots > 0 {
-        let words = if shots == 1 { "The picture is".to_owned() } else { format!("{shots} pictures are") };
-        items.push(format!("{words} shown once each; a single picture is an example, not a measurement."));
+        let words = if shots == 1 { "The picture was".to_owned() } else { format!("The {shots} pictures were each") };
+        items.push(format!("{words} rendered once; a single picture is an example, not a measurement."));
     }
     items.push(format!(
         "{} at small sizes: other scenes, sizes and lenses may rank the samplers otherwise.",
         counted(summary.scenes.len(), "scene", "scenes")
     ));
     page.bullets(&items);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::results::Count;
+
+    fn cell(bias2: Estimate) -> Cell {
+        let none = Estimate::without_interval(0.0);
+        Cell {
+            scene: 0,
+            sampler: 0,
+            id: String::new(),
+            spp: Count { asked: 256, taken: 256 },
+            replicates: 8,
+            is_fixed: false,
+            is_reference_limited: false,
+            mse: Estimate::without_interval(1.0),
+            rmse: None,
+            rel_mse: none,
+            bias2,
+            variance: None,
+            bias: none,
+            error_autocorrelation: None,
+            replicate_mse: Vec::new(),
+            replicate_mean: Vec::new(),
+            pixels: Vec::new(),
+            twins: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn an_error_that_falls_is_never_called_right_but_bounded() {
+        let cell = cell(Estimate { value: 0.0, ci95: Some([-0.05, 0.05]) });
+        let step = Step { from: 64, to: 256, rmse_ratio: Estimate { value: 0.66, ci95: Some([0.64, 0.68]) } };
+        assert!(step.is_flatter_than_independent());
+        assert_eq!(falling_words(&cell, 256, None, None), "no bias seen up to 256 spp, at most 5.0 % of the MSE");
+        assert_eq!(
+            falling_words(&cell, 256, Some("decisions in step"), Some(&step)),
+            "no bias seen up to 256 spp, at most 5.0 % of the MSE; not promised: decisions in step; flattens: RMSE 256 / 64 = 0.660 [0.640, 0.680]"
+        );
+        let half = Step { rmse_ratio: Estimate { value: 0.5, ci95: Some([0.49, 0.51]) }, ..step };
+        assert!(!half.is_flatter_than_independent(), "independent samples");
+        assert!((half.slope().value + 0.5).abs() < 1e-15);
+    }
 }

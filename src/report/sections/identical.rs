@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::stats::Estimate;
-use crate::stats::hypothesis::{holm, welch};
+use crate::stats::Moments;
+use crate::stats::hypothesis::{holm, two_sided};
 
 use super::super::evidence::Limit;
 use super::super::markdown::{Page, link_to};
@@ -14,6 +15,9 @@ use super::{tabulate_folded, titles};
 
 /// Means count as equal in practice within this share of the mean radiance.
 pub const EQUIVALENT: f64 = 0.01;
+
+/// Adjusted p-values below this are told in words.
+const TOLD_APART: f64 = 0.01;
 
 /// Images of a scene that are bit for bit the same, by their digests.
 pub struct Bytes {
@@ -113,8 +117,8 @@ fn means_table(summary: &Summary, most: u32, page: &mut Page) {
     let lines: Vec<Vec<String>> = (0..summary.scenes.len()).flat_map(|scene| means(summary, scene, most)).collect();
     let within = format!("within {} %", 100.0 * EQUIVALENT);
     let caption = format!(
-        "Error of the mean at {most} spp: mean signed error in percent of the reference's mean radiance; \"{within}\" asks the whole interval. p: Welch's test of the \
-         replicates' means against uniform sampling's, Holm-adjusted over the samplers of a scene, – where there is one replicate; {}.",
+        "Error of the mean at {most} spp: mean signed error in percent of the reference's mean radiance; \"{within}\" asks the whole interval. p: Student's test of the \
+         replicates' mean error against 0 (the truth: closed form, or the reference with its own noise), Holm-adjusted over the samplers of a scene, – where there is one replicate; {}.",
         level(summary)
     );
     let head = ["scene", "sampler", "error of the mean (%)", &within, "p", "row"];
@@ -144,7 +148,7 @@ fn means(summary: &Summary, scene: usize, most: u32) -> Vec<Vec<String>> {
 }
 
 /// Which means agree, and whether one hides a wrong image.
-fn means_sentences(summary: &Summary, scene: usize, cells: &[&Cell]) -> [String; 2] {
+fn means_sentences(summary: &Summary, scene: usize, cells: &[&Cell]) -> [String; 3] {
     let off: Vec<String> = cells
         .iter()
         .filter(|cell| relative_bias(summary, cell).is_some_and(|bias| equivalent(&bias) == "no"))
@@ -184,24 +188,68 @@ fn means_sentences(summary: &Summary, scene: usize, cells: &[&Cell]) -> [String;
             listed(list)
         ),
     };
-    [words, hidden]
+    let p_values = p_values(summary, cells);
+    let told: Vec<String> = cells
+        .iter()
+        .filter(|cell| p_values.get(&cell.sampler).is_some_and(|p| *p < TOLD_APART))
+        .filter(|cell| relative_bias(summary, cell).is_some_and(|bias| equivalent(&bias) == "yes"))
+        .map(|cell| name(summary, cell.sampler))
+        .collect();
+    let told = match told.as_slice() {
+        [] => String::new(),
+        list => format!(
+            "Within that, {} still told apart from the truth (p < {TOLD_APART}): small, but no chance.",
+            if list.len() == 1 {
+                format!("the mean of {} is", list[0])
+            } else {
+                format!("the means of {} are", listed(list))
+            }
+        ),
+    };
+    [words, told, hidden]
 }
 
 fn agree(n: usize) -> String {
     format!("{} {}", counted(n, "mean", "means"), if n == 1 { "agrees" } else { "agree" })
 }
 
-/// Holm-adjusted p-values against uniform sampling, by sampler.
+/// p of a mean error of `bias` with R replicates' means about it: Student's t with R − 1 degrees of freedom, the reference's own
+/// standard error added in squares (more of it only makes the test more cautious); `None` of one replicate, or where nothing
+/// varies.
+fn p_of_mean(bias: f64, replicate_mean: &[f64], reference_error: f64) -> Option<f64> {
+    let moments: Moments = replicate_mean.iter().copied().collect();
+    let error = libm::hypot(moments.standard_error()?, reference_error);
+    (error > 0.0 && error.is_finite()).then(|| two_sided(bias / error, (replicate_mean.len() - 1) as f64))
+}
+
+/// Holm-adjusted p-values against the truth, by sampler.
 fn p_values(summary: &Summary, cells: &[&Cell]) -> BTreeMap<usize, f64> {
-    let uniform = cells.iter().find(|cell| Some(cell.sampler) == summary.uniform());
-    let Some(uniform) = uniform else { return BTreeMap::new() };
+    // The error of the reference's mean, pixels independent, the channels of one as one.
+    let noise = |cell: &Cell| {
+        let scene = &summary.scenes[cell.scene];
+        Some(scene.reference_rmse()? / (scene.pixels as f64).sqrt())
+    };
     let (samplers, raw): (Vec<usize>, Vec<f64>) = cells
         .iter()
-        .filter(|cell| cell.sampler != uniform.sampler)
-        .filter_map(|cell| Some((cell.sampler, welch(&cell.replicate_mean, &uniform.replicate_mean)?.p_two_sided)))
+        .filter_map(|cell| Some((cell.sampler, p_of_mean(cell.bias.value, &cell.replicate_mean, noise(cell)?)?)))
         .unzip();
     match holm(&raw) {
         Ok(adjusted) => samplers.into_iter().zip(adjusted).collect(),
         Err(_) => BTreeMap::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_is_tested_against_the_truth_with_the_reference_s_own_noise() {
+        let means = [1.0, 1.2, 0.8, 1.0];
+        // Standard error √(0.08/3)/2 = 0.0816; t = 0.26/0.0816 = 3.184 is the 97.5 % point at 3 degrees of freedom (3.182).
+        let p = p_of_mean(0.26, &means, 0.0).unwrap();
+        assert!((p - 0.05).abs() < 5e-4, "{p}");
+        assert!(p_of_mean(0.26, &means, 0.1).unwrap() > p && p_of_mean(0.0, &means, 0.0) == Some(1.0));
+        assert_eq!((p_of_mean(0.26, &means[..1], 0.0), p_of_mean(0.1, &[1.0, 1.0], 0.0)), (None, None));
     }
 }

@@ -20,6 +20,7 @@ mod convergence;
 mod correlation;
 mod decisions;
 mod failures;
+mod flaws;
 mod identical;
 mod opening;
 mod pictures;

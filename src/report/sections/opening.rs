@@ -107,7 +107,7 @@ pub fn how_to_read(summary: &Summary, page: &mut Page) {
         format!(
             "A verdict on where an error goes compares {}: it *falls* if the RMSE's ratio lies below the border half-way (on a \
              logarithmic scale) between independent samples and no gain, and stays if it lies above; then the image is *wrong* if there is a bias that \
-             stays, too, and it *stalls* if no bias is seen. A bias is called only where 0 is more than twice as far from the estimate as the interval's \
+             stays, too, while the variance falls; it *stalls* if no bias is seen, and *stalls and is biased* if the variance stays beside the bias. A bias is called only where 0 is more than twice as far from the estimate as the interval's \
              end, since among so many intervals some miss 0 by chance.",
             summary.course_counts().map_or("two counts".to_owned(), |(a, b)| format!("{a} with {b} spp"))
         ),

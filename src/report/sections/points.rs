@@ -1,5 +1,6 @@
 //! The point sets themselves: the sheet's Figure 2, discrepancy, and how even each set is.
 
+use crate::sampling::Points;
 use crate::stats::{Estimate, IntervalKind, SlopeFit, slope_with_interval};
 
 use super::super::charts::FIGURE_2_POINTS;
@@ -122,28 +123,29 @@ pub fn star_against_uniform(summary: &Summary, sampler: usize) -> Option<(Estima
 pub fn within(summary: &Summary, page: &mut Page) {
     page.heading(3, titles::WITHIN);
     let compared: Vec<(usize, Estimate, u32, String)> = (0..summary.samplers.len())
-        .filter(|&sampler| Some(sampler) != summary.uniform())
         .filter_map(|sampler| star_against_uniform(summary, sampler).map(|(r, n, id)| (sampler, r, n, id)))
         .collect();
     let Some(n) = compared.first().map(|(_, _, n, _)| *n) else {
         page.paragraph("Nothing can be said of the points within a set: no point sets of uniform sampling and another were measured.");
         return;
     };
-    let even: Vec<String> = compared
-        .iter()
+    let others = || compared.iter().filter(|(sampler, ..)| Some(*sampler) != summary.uniform());
+    if others().next().is_none() {
+        page.paragraph("Nothing can be said of the points within a set: no point sets of another sampler than uniform were measured.");
+        return;
+    }
+    let even: Vec<String> = others()
         .filter(|(_, ratio, ..)| below(ratio, 1.0) == Answer::Yes)
         .map(|(sampler, ..)| name(summary, *sampler))
         .collect();
-    let not: Vec<String> = compared
-        .iter()
+    let not: Vec<String> = others()
         .filter(|(_, ratio, ..)| below(ratio, 1.0) != Answer::Yes)
         .map(|(sampler, ..)| name(summary, *sampler))
         .collect();
     let mut sentences = Vec::new();
     if !even.is_empty() {
         sentences.push(format!(
-            "At n = {n} the points of {} are more even than independent ones: each keeps away from the others, so they are correlated within \
-             the set.",
+            "At n = {n} the points of {} are more even than independent ones, by their discrepancy: so they are correlated within the set.",
             listed(&even)
         ));
     }
@@ -162,13 +164,15 @@ fn evenness_table(summary: &Summary, compared: &[(usize, Estimate, u32, String)]
             sets.filter(|s| s.sampler == sampler && s.metric == metric && s.n.asked == n).max_by_key(|s| s.n.taken);
         found.map_or(Vec::new(), |set| set.values.clone())
     };
+    // A net of base 2 has a t-value of base 2; Halton's points are one of no single base.
+    let is_base_two = |sampler: usize| summary.samplers[sampler].spec().is_some_and(|s| s.points != Points::Halton);
     let rows: Vec<Vec<String>> = compared
         .iter()
         .map(|(sampler, ratio, _, id)| {
             vec![
                 name(summary, *sampler),
-                ratio_cell(Some(*ratio)),
-                range(&metric(*sampler, "t_value")),
+                if Some(*sampler) == summary.uniform() { "1".to_owned() } else { ratio_cell(Some(*ratio)) },
+                if is_base_two(*sampler) { range(&metric(*sampler, "t_value")) } else { "–".to_owned() },
                 range(&metric(*sampler, "min_toroidal_distance")),
                 id.clone(),
             ]
@@ -176,8 +180,8 @@ fn evenness_table(summary: &Summary, compared: &[(usize, Estimate, u32, String)]
         .collect();
     let heads = ["sampler", "D* / uniform's D*", "t-value", "least distance (torus)", "row"];
     let caption = format!(
-        "Evenness of n = {n} points: D* over that of uniform points with its 95 % interval; t-value (0 is best: how coarse boxes must be to hold equal \
-         shares of the points; – where n is no power of two) and least toroidal distance between two points of the unit square, each as the range over {}.",
+        "Evenness of n = {n} points: D* over that of uniform points with its 95 % interval; t-value in base 2 (0 is best: how coarse boxes must be to hold equal \
+         shares of the points; – where n is no power of two, and for Halton's points, which have a base for each axis) and least toroidal distance between two points of the unit square, each as the range over {}.",
         sets_measured(summary)
     );
     tabulate(page, "evenness", &caption, &heads, &rows);

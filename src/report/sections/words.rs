@@ -49,6 +49,7 @@ pub fn limit_words(course: &Course) -> &'static str {
     match (course.limit(), course.is_biased()) {
         (Limit::Wrong, _) => "converges to a wrong image",
         (Limit::Stalls, _) => "stalls, no bias seen",
+        (Limit::StallsBiased, _) => "stalls, and is biased",
         (Limit::Falls, Answer::Yes) => "error falls, but biased",
         (Limit::Falls, Answer::No) => "error falls, no bias seen",
         (Limit::Falls, Answer::CannotTell) => "error falls, perhaps biased",
