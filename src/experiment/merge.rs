@@ -85,7 +85,7 @@ impl Sources {
         let shared = all.iter().filter(|folder| !is_out(folder)).map(|folder| FolderLock::share(folder));
         let shared = shared.collect::<Result<_>>()?;
         // What may differ – the version, what an earlier one wrote – is the same one's whatever the order.
-        let about = abouts.iter().min_by_key(|about| super::lines::line(about)).unwrap_or(about).clone();
+        let about = abouts.iter().min_by_key(super::lines::line).unwrap_or(about).clone();
         let made = Made((!out.exists()).then(|| out.to_owned()));
         Ok(Self {
             out: out.to_owned(),
