@@ -53,12 +53,15 @@ pub fn section(summary: &Summary, page: &mut Page) {
     if lines.is_empty() {
         page.paragraph("No failure is seen in these rows: no error stays, no bias is seen, no neighbours err alike, no count between powers of two costs accuracy.");
     }
+    let elsewhere = match summary.stability.is_empty() {
+        true => String::new(),
+        false => format!("; a sample more or less, two passes and scale are in {}", link_to(titles::STABILITY)),
+    };
     let caption = format!(
         "Failures that the rows of the plain images show: what happens, and the number that says so (bias² in (W/(m² sr))²); {}. The counts of a verdict are in {}. What has nothing random in it \
-         is all bias and is not listed for that alone; a sample more or less, two passes and scale are in {}.",
+         is all bias and is not listed for that alone{elsewhere}.",
         level(summary),
         link_to(titles::READING),
-        link_to(titles::STABILITY)
     );
     tabulate(page, "failures", &caption, &["failure", "sampler", "scene", "measured", "row"], &lines);
 }
