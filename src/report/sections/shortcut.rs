@@ -121,13 +121,17 @@ fn sentence(summary: &Summary, scene: usize, pair: &Pair) -> String {
     };
     let share = pair.sheet.bias_share().filter(|_| is_biased(&pair.sheet.bias2) == Answer::Yes);
     let share = share.map(|share| format!(" (bias² is {} of its MSE)", percent(share.min(1.0)))).unwrap_or_default();
+    // Means of images with the same seeds differ by the estimator alone: they part what the noise of bias² hides.
+    let parts = |ratio: &Estimate| clearly_above_one(ratio) || clearly_above_one(&inverse(ratio));
+    let is_hidden = is_biased(&pair.sheet.bias2) != Answer::Yes && pair.brightness().is_some_and(|r| parts(&r));
+    let hidden = if is_hidden { ", which is a bias that bias² does not tell from noise" } else { "" };
     let unbiased = match is_biased(&pair.unbiased.bias2) {
         Answer::No => "of the unbiased estimator no bias is seen",
         Answer::Yes => "the unbiased estimator under this sampler shows a bias, too",
         Answer::CannotTell => "whether the unbiased estimator has a bias under this sampler cannot be told",
     };
     format!(
-        "{} in {}: {verdict}{share}, {}; {unbiased}. {}",
+        "{} in {}: {verdict}{share}, {}{hidden}; {unbiased}. {}",
         name(summary, pair.sampler),
         scene_name(summary, scene),
         brightness_words(pair.brightness()),
@@ -135,10 +139,15 @@ fn sentence(summary: &Summary, scene: usize, pair: &Pair) -> String {
     )
 }
 
+/// One over a ratio.
+fn inverse(ratio: &Estimate) -> Estimate {
+    Estimate { value: 1.0 / ratio.value, ci95: ratio.ci95.map(|[low, high]| [1.0 / high, 1.0 / low]) }
+}
+
 /// How the brightness of the whole image compares.
 fn brightness_words(ratio: Option<Estimate>) -> String {
     let Some(ratio) = ratio else { return "its brightness cannot be compared".to_owned() };
-    let inverse = Estimate { value: 1.0 / ratio.value, ci95: ratio.ci95.map(|[low, high]| [1.0 / high, 1.0 / low]) };
+    let inverse = inverse(&ratio);
     // By twice the interval's distance, as a bias is called.
     match (clearly_above_one(&inverse), clearly_above_one(&ratio)) {
         (true, _) => format!("darker by a factor of {}", estimate(&inverse)),
