@@ -2,11 +2,17 @@
 
 use glam::{Vec2, Vec3};
 
+use crate::mutants::{Mutant, planted};
+
 /// Concentric map of the unit square to the unit disk: area-preserving up to the factor π, so uniform with pdf 1/π.
 ///
 /// Shirley & Chiu (1997), doi:10.1080/10867651.1997.10487479. The centre (½, ½) goes to the centre; finite everywhere.
 #[inline]
 pub fn square_to_disk(u: Vec2) -> Vec2 {
+    if planted(Mutant::DiskWithoutRoot) {
+        let angle = std::f32::consts::TAU * u.y;
+        return u.x * Vec2::new(libm::cosf(angle), libm::sinf(angle));
+    }
     let a = 2.0 * u.x - 1.0;
     let b = 2.0 * u.y - 1.0;
     if a == 0.0 && b == 0.0 {

@@ -1,0 +1,8 @@
+//! Where methods fail, each failure stated as a fact that holds.
+
+use super::Check;
+
+/// The checks of all groups of failures.
+pub fn checks() -> Vec<Check> {
+    Vec::new()
+}
