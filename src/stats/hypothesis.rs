@@ -11,6 +11,7 @@ use super::special::{
     student_two_sided_inverse,
 };
 use crate::error::{Error, Result};
+use crate::mutants::{Mutant, planted};
 
 /// The chance of detection at which [`Verdict::detects`] is stated.
 pub const POWER: f64 = 0.99;
@@ -44,6 +45,9 @@ impl Family {
 /// Šidák's level of one of `tests` tests, 1 − (1 − α)^(1/tests), by way of expm1 and log1p so that it never rounds to
 /// 0.
 pub fn sidak(alpha: f64, tests: u32) -> f64 {
+    if planted(Mutant::SidakInSingle) {
+        return 1.0 - f64::from(libm::powf(1.0 - alpha as f32, 1.0 / tests as f32));
+    }
     -libm::expm1(libm::log1p(-alpha) / f64::from(tests))
 }
 
@@ -166,6 +170,7 @@ pub fn z_test(value: f64, exact: f64, standard_error: f64, family: Family) -> Ve
 fn against_exact(value: f64, exact: f64, error: f64, df: f64, family: Family) -> Verdict {
     // Shifted by the bias, T is outside ± the critical value with probability POWER once the bias exceeds both
     // quantiles; for Student this treats the estimated error as fixed, which is good to its relative spread.
+    let df = if planted(Mutant::NormalForStudent) { f64::INFINITY } else { df };
     let critical = student_two_sided_inverse(family.per_test(), df);
     let detects = Some((critical + student_t_quantile(POWER, df)) * error);
     let answer = match definite(value, exact, error) {
@@ -208,7 +213,11 @@ pub fn welch(a: &[f64], b: &[f64]) -> Option<WelchResult> {
     let t = (mean_a - mean_b) / error;
     // As shares of the total: their fourth powers cannot all underflow.
     let share = |e: f64, n: u64| (e / error) * (e / error) * (e / error) * (e / error) / (n - 1) as f64;
-    let df = 1.0 / (share(error_a, a.n()) + share(error_b, b.n()));
+    let df = if planted(Mutant::PooledFreedom) {
+        (a.n() + b.n() - 2) as f64
+    } else {
+        1.0 / (share(error_a, a.n()) + share(error_b, b.n()))
+    };
     Some(WelchResult { t: Some(t), df: Some(df), p_two_sided: student_two_sided(t, df) })
 }
 
@@ -251,7 +260,8 @@ pub fn chi2_test(observed: &[u64], expected: &[f64], family: Family) -> Verdict 
         return undefined("fewer than two cells are left after pooling");
     }
     let statistic = sum(cells.iter().map(|&(o, e)| (o as f64 - e) * (o as f64 - e) / e));
-    Verdict::tested(family, statistic, chi2_upper_tail(statistic, cells.len() as f64 - 1.0))
+    let constraints = if planted(Mutant::CellsAsFreedom) { 0.0 } else { 1.0 };
+    Verdict::tested(family, statistic, chi2_upper_tail(statistic, cells.len() as f64 - constraints))
 }
 
 /// Cells by rising expectation, small ones joined until each expects at least [`MIN_EXPECTED`].
@@ -288,7 +298,8 @@ pub fn ks_uniform_test(values: &[f64], family: Family) -> Verdict {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let n = sorted.len() as f64;
-    let gap = |(i, &v): (usize, &f64)| ((i + 1) as f64 / n - v).max(v - i as f64 / n);
+    let below = |i: usize, v: f64| if planted(Mutant::SmirnovOneSided) { 0.0 } else { v - i as f64 / n };
+    let gap = |(i, &v): (usize, &f64)| ((i + 1) as f64 / n - v).max(below(i, v));
     let distance = sorted.iter().enumerate().map(gap).fold(0.0, f64::max);
     Verdict::tested(family, distance, (2.0 * one_sided_smirnov(sorted.len(), distance)).min(1.0))
 }
@@ -330,7 +341,8 @@ pub fn holm(p_values: &[f64]) -> Result<Vec<f64>> {
     let mut adjusted = vec![0.0; p_values.len()];
     let mut largest: f64 = 0.0;
     for (rank, i) in ranked(p_values)?.into_iter().enumerate() {
-        largest = largest.max(((p_values.len() - rank) as f64 * p_values[i]).min(1.0));
+        let left = if planted(Mutant::HolmFromTheWrongEnd) { rank + 1 } else { p_values.len() - rank };
+        largest = largest.max((left as f64 * p_values[i]).min(1.0));
         adjusted[i] = largest;
     }
     Ok(adjusted)
@@ -361,6 +373,10 @@ pub fn clopper_pearson(successes: u64, trials: u64, confidence: f64) -> [f64; 2]
     assert!(successes <= trials, "{successes} successes in {trials} trials");
     let tail = 0.5 * (1.0 - confidence);
     let (k, n) = (successes as f64, trials as f64);
+    if planted(Mutant::WaldInterval) {
+        let half = normal_factor(confidence) * (k / n * (1.0 - k / n) / n).sqrt();
+        return [k / n - half, k / n + half];
+    }
     let at_least_k = |p: f64| incomplete_beta(k, n - k + 1.0, p, 1.0 - p);
     let at_most_k = |p: f64| incomplete_beta(n - k, k + 1.0, 1.0 - p, p);
     let low = if successes == 0 { 0.0 } else { solve_falling(|p| -at_least_k(p), -tail, 0.0, 1.0) };

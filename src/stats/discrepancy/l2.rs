@@ -8,6 +8,8 @@ use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
+use crate::mutants::{Mutant, planted};
+
 use super::Points;
 
 /// Which L2 discrepancy. In the formulas a = |x − ½|, b = |y − ½|, t = |x − y|.
@@ -188,6 +190,7 @@ fn mean_over_pairs(points: &Points, k: impl Fn(f64, f64) -> f64 + Sync) -> Doubl
     let axes: Vec<Vec<f64>> = (0..points.dimension()).map(|axis| points.axis(axis)).collect();
     let row = |i: usize| {
         let diagonal = axes.iter().map(|axis| k(axis[i], axis[i])).product::<f64>();
+        let diagonal = if planted(Mutant::L2WithoutDiagonal) { 0.0 } else { diagonal };
         row_sum(&axes, i, &k).scaled(2.0).plus(Double::from(diagonal))
     };
     let rows: Vec<Double> = (0..n).into_par_iter().with_min_len(16).map(row).collect();
