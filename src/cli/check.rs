@@ -211,15 +211,14 @@ impl Check {
         let started = Instant::now();
         let at_once = if about.get("scene").is_some() { 1 } else { self.work.threads().min(2) };
         let ended = start(jobs, at_once, stop.clone());
-        let mut results: Vec<Option<check::Result>> = (0..count).map(|_| None).collect();
+        let mut results: Vec<Option<(check::Result, f64)>> = (0..count).map(|_| None).collect();
         let mut shown = 0;
         while let Some((place, result, seconds)) = next(&ended, &stop) {
             bar.inc(1);
             bar.set_message(result.name);
-            results[place] = Some(result);
-            let _ = seconds;
-            while let Some(Some(result)) = results.get(shown) {
-                self.show(result, verbose || self.verbose, &bar)?;
+            results[place] = Some((result, seconds));
+            while let Some(Some((result, seconds))) = results.get(shown) {
+                self.show(result, *seconds, verbose || self.verbose, &bar)?;
                 shown += 1;
             }
         }
@@ -230,13 +229,13 @@ impl Check {
                 format!("expected {count} checks to end, found an interrupt after {shown}"),
             ));
         }
-        let results: Vec<check::Result> = results.into_iter().flatten().collect();
+        let results: Vec<check::Result> = results.into_iter().flatten().map(|(result, _)| result).collect();
         self.sum_up(&results, settings, started.elapsed().as_secs_f64(), about)
     }
 
     /// One result as text: on stdout, or on stderr where stdout is for JSON.
-    fn show(&self, result: &check::Result, verbose: bool, bar: &ProgressBar) -> Result<()> {
-        let mut text = result.line();
+    fn show(&self, result: &check::Result, seconds: f64, verbose: bool, bar: &ProgressBar) -> Result<()> {
+        let mut text = format!("{}, {seconds:.1} s", result.line());
         if verbose || !result.finding.passed {
             text += &format!("\n      claim: {}\n      found: {}", result.claim, result.finding.says);
         }

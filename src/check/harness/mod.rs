@@ -141,9 +141,9 @@ fn is_compatible(count: u64, runs: u64, [low, high]: [f64; 2], family: Family) -
     least <= high && most >= low
 }
 
-/// χ² and Welch's test are approximations: what their true rate may be of the nominal one. Measured by 10⁶ runs each, they
-/// lie within ±15 % at a level of 1 % for the data above; Kolmogorov–Smirnov's bound is within 1 % of exact.
-const APPROXIMATION: f64 = 0.15;
+/// χ² and Welch's test are approximations: how far their true rate may be off the nominal one, as a share of it. By 500 000
+/// runs each (`check null-tests --budget 3000`) it is 0.95 % for Welch's and 1.04 % for χ², of the data above at 1 %.
+const APPROXIMATION: f64 = 0.1;
 
 fn null_tests(context: &Context) -> Finding {
     let runs = u64::from(context.replicates(10_000, 1_000));
@@ -154,7 +154,7 @@ fn null_tests(context: &Context) -> Finding {
         for (kind, (name, p)) in p_values(&mut draws).into_iter().enumerate() {
             names[kind] = name;
             // A test that gives no p-value has not held.
-            alarms[kind] += u64::from(!(p >= LEVEL));
+            alarms[kind] += u64::from(p.is_nan() || p < LEVEL);
         }
     }
     let family = context.family(4);
@@ -216,8 +216,8 @@ fn power_of_t(context: &Context) -> Finding {
     let mut draws = Draws::new(context.seed);
     let mut tally = Tally::new();
     let mut said = Vec::new();
-    // At these levels the t of the level and that of the power add up to the bias in standard errors; that the error is an
-    // estimate spreads the statistic by 1/√(2(n − 1)) of itself, so that found is a little less than promised.
+    // The t of the level and that of the power add up to the bias in standard errors. That the error is an estimate spreads the
+    // statistic by 1/√(2(n − 1)) of itself, so that less is found than promised: 0.973 of 0.99 at 10⁻⁴ (200 000 runs).
     for level in [1e-2, 1e-4] {
         let family = Family { tests: 1, false_alarm: level };
         // For numbers of standard deviation 1.

@@ -302,7 +302,7 @@ fn bias(question: &Question, settings: &Settings, level: f64) -> Finding {
         relative(whole.mean - whole.expected, scale),
     );
     if let Some(p) = histogram_p {
-        says += &format!("; p-values of the tiles are uniform with p = {p:.1e}");
+        says += &format!("; the tiles' p-values are those of an unbiased image with p = {p:.1e}");
     }
     says += &format!(
         "; a bias of {:.2} % of the image's mean in any tile, or {:.2} % everywhere, would be caught",

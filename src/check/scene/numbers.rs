@@ -8,7 +8,7 @@ use std::f64::consts::{PI, SQRT_2};
 
 use crate::sampling::hash::derive;
 use crate::sampling::{Decision, Dim1, Dim2, PixelKey, PointSource, SampleLayout, Sampler, SamplerSet};
-use crate::stats::hypothesis::sidak;
+use crate::stats::hypothesis::{sidak, two_sided};
 use crate::stats::{Family, Moments, t_test};
 
 /// Most samples of a pixel that are looked at, the first ones.
@@ -47,7 +47,7 @@ pub fn pairs(set: SamplerSet, layout: &SampleLayout, spp: u32, seed: u64, replic
             (claim.decision, ticket)
         })
         .collect();
-    let mut together: Vec<([usize; 2], Vec<[f64; 2]>)> = Vec::new();
+    let mut together: Vec<([usize; 2], Vec<[[f64; 2]; 2]>)> = Vec::new();
     let mut owners: Vec<Decision> = Vec::new();
     let mut n = 1;
     for replicate in 0..replicates {
@@ -61,7 +61,10 @@ pub fn pairs(set: SamplerSet, layout: &SampleLayout, spp: u32, seed: u64, replic
         }
         let functions: Vec<[Vec<f64>; 2]> = columns.iter().map(|(_, values)| functions(values)).collect();
         for ([a, b], list) in &mut together {
-            list.push([0, 1].map(|f| product(&functions[*a][f], &functions[*b][f])));
+            list.push([0, 1].map(|f| {
+                let (u, v) = (&functions[*a][f], &functions[*b][f]);
+                [product(u, v), pearson(u, v)]
+            }));
         }
     }
     // A mean and a spread of each function of each pair.
@@ -74,16 +77,17 @@ pub fn pairs(set: SamplerSet, layout: &SampleLayout, spp: u32, seed: u64, replic
             pairs.len() - 1
         });
         for function in 0..2 {
-            let values: Vec<f64> = list.iter().map(|q| q[function]).collect();
-            pairs[place].take(&values, n, each);
+            let values: Vec<f64> = list.iter().map(|q| q[function][0]).collect();
+            let pearson = list.first().map_or(0.0, |q| q[function][1]);
+            pairs[place].take(&values, pearson, n, each);
         }
     }
     pairs
 }
 
 impl Pair {
-    /// Adds the q of one pair of coordinates and one function.
-    fn take(&mut self, values: &[f64], n: u32, level: f64) {
+    /// Adds the q of one pair of coordinates and one function; `pearson` is the correlation within the first set.
+    fn take(&mut self, values: &[f64], pearson: f64, n: u32, level: f64) {
         let moments: Moments = values.iter().copied().collect();
         let mean = moments.mean().unwrap_or(0.0);
         let squares: Vec<f64> = values.iter().map(|q| q * q * f64::from(n)).collect();
@@ -95,8 +99,10 @@ impl Pair {
         let family = Family { tests: 1, false_alarm: level };
         let rises = |bound: f64| spread > bound && !t_test(&squares, bound, family).holds();
         self.is_coupled |= if moments.variance().unwrap_or(0.0) == 0.0 {
-            // One set for all seeds: as far out as independent numbers are once in 1/level times.
-            mean.abs() * f64::from(n).sqrt() > crate::stats::student_t_quantile(1.0 - 0.5 * level, f64::INFINITY)
+            // One set for all seeds: as far out as independent normal numbers are once in 1/level times.
+            let df = f64::from(n) - 2.0;
+            let t = pearson * (df / (1.0 - pearson * pearson).max(f64::MIN_POSITIVE)).sqrt();
+            n > 2 && two_sided(t, df) < level
         } else {
             !t_test(values, 0.0, family).holds() || (n > 1 && rises(f64::from(n) / f64::from(n - 1)))
         };
@@ -127,6 +133,15 @@ fn functions(values: &[f32]) -> [Vec<f64>; 2] {
 
 fn product(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / a.len() as f64
+}
+
+/// Correlation within one set.
+fn pearson(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len() as f64;
+    let (mean_a, mean_b) = (a.iter().sum::<f64>() / n, b.iter().sum::<f64>() / n);
+    let of = |x: &[f64], p: f64, y: &[f64], q: f64| x.iter().zip(y).map(|(x, y)| (x - p) * (y - q)).sum::<f64>();
+    let scale = (of(a, mean_a, a, mean_a) * of(b, mean_b, b, mean_b)).sqrt();
+    if scale > 0.0 { (of(a, mean_a, b, mean_b) / scale).clamp(-1.0, 1.0) } else { 0.0 }
 }
 
 #[cfg(test)]
