@@ -26,7 +26,8 @@ impl PixelKey {
 /// Numbers for the decisions of a scene.
 ///
 /// The `fill` functions write a span of consecutive sample indices of one pixel and are the way of the render loop;
-/// single look-ups are spans of length 1.
+/// single look-ups are spans of length 1. Indices from `samples()` on belong to no set: asking for them is a mistake of the
+/// program and stops it ([`Sampler::check_index`] asks first).
 pub trait PointSource: Sync {
     /// Samples per pixel; indices are `0..samples()`.
     fn samples(&self) -> u32;
@@ -83,6 +84,18 @@ impl Sampler {
             decisions[claim.decision as usize] = Some(DecisionSampler::new(spec, claim, samples, seed));
         }
         Ok(Self { decisions, samples })
+    }
+
+    /// Whether sample `index` exists: for indices that come from outside. A set belongs to its count, so none of its points
+    /// lies beyond; more samples are another sampler's, made for their count.
+    ///
+    /// # Errors
+    /// Kind `Input` with the range.
+    pub fn check_index(&self, index: u64) -> Result<()> {
+        match index < u64::from(self.samples) {
+            true => Ok(()),
+            false => Err(Error::input("sample index", format!("expected 0 to {}, found {index}", self.samples - 1))),
+        }
     }
 
     fn decision(&self, decision: Decision) -> &DecisionSampler {
@@ -239,7 +252,9 @@ impl DecisionSampler {
     /// π(i) for `count` ≤ [`BLOCK`] consecutive indices; what follows them is 0.
     #[inline]
     fn places(&self, first: u32, count: usize, keys: &Keys) -> [u32; BLOCK] {
-        debug_assert!(first as usize + count <= self.samples as usize, "sample {first} + {count} of {}", self.samples);
+        // Also in release: beyond its count Hammersley's x is 1 and strata begin anew.
+        let end = u64::from(first) + count as u64;
+        assert!(end <= u64::from(self.samples), "samples {first} to {end} asked of {}", self.samples);
         let mut places = [0; BLOCK];
         let indices = (first..).zip(&mut places[..count]);
         if self.spec.order == Order::Shuffle {
@@ -436,6 +451,21 @@ mod tests {
         let mut no_pick = SampleLayout::default();
         no_pick.claim_2d(Decision::Pixel);
         assert!(!SamplerSet::from(spec("halton:sheet")).is_random(&no_pick));
+    }
+
+    #[test]
+    fn an_index_beyond_the_count_is_refused_before_and_stops_the_program_after() {
+        let t = tickets();
+        for s in every_legal_spec().into_iter().filter(|s| s.points != Points::Center) {
+            let sampler = Sampler::new(s, &t.layout, 16, 1).unwrap();
+            assert!(sampler.check_index(u64::from(sampler.samples()) - 1).is_ok());
+            for index in [u64::from(sampler.samples()), 1 << 31, u64::MAX] {
+                assert_eq!(sampler.check_index(index).unwrap_err().exit_code(), 2, "{s}");
+            }
+        }
+        let sampler = Sampler::new(spec("hammersley"), &t.layout, 16, 1).unwrap();
+        let beyond = std::panic::catch_unwind(|| sampler.get_2d(PixelKey::new(0, 0), 16, &t.pixel));
+        assert!(beyond.is_err());
     }
 
     #[test]
