@@ -7,6 +7,7 @@
 mod common;
 mod correlation;
 mod counts;
+mod domains;
 mod net_counts;
 mod numbers;
 mod room;
@@ -23,6 +24,7 @@ pub fn checks() -> Vec<Check> {
         sharing::checks(),
         counts::checks(),
         net_counts::checks(),
+        domains::checks(),
         scrambles::checks(),
     ]
     .concat()

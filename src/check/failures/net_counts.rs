@@ -65,8 +65,8 @@ fn net_at_48(context: &Context) -> Finding {
         };
         let squares = |n: u32| -> Vec<f64> { errors(n).iter().map(|e| e * e).collect() };
         let odd = errors(n);
-        // Truncation to 24 bits lowers the product's mean by 2⁻²⁵ in each coordinate, half of it by the other's mean.
-        tally.verdict(format!("{n} points: mean error"), &t_test(&odd, -(2f64.powi(-25)), family), promised(n).sqrt());
+        // Truncation to 24 bits lowers each coordinate by 2⁻²⁵ on average, and the product of two by as much in all.
+        tally.verdict(format!("{n} points: mean error"), &t_test(&odd, -2f64.powi(-25), family), 0.25);
         let net = n.next_power_of_two() / 2;
         tally.verdict(
             format!("{net} points: variance"),
