@@ -88,8 +88,8 @@ fn hammersley_beyond(_: &Context) -> Finding {
     let tickets = Tickets::new();
     let mut largest = 0.0f64;
     for n in [1u32, 2, 3, 16, 48, 1000, 1 << 24] {
-        let naive = n as f32 / n as f32;
-        tally.fact(format!("x of point {n} of {n} is {naive}"), naive >= 1.0);
+        let naive = [n - 1, n].map(|i| i as f32 / n as f32);
+        tally.fact(format!("x of points {} and {n} of {n}: {naive:?}", n - 1), naive[0] < 1.0 && naive[1] >= 1.0);
         for text in ["hammersley:plain", "hammersley:step:yxor", "hammersley:shuffle:shift"] {
             let sampler = tickets.sampler(text, n, 1);
             let refused = sampler.check_index(u64::from(n));
@@ -162,7 +162,7 @@ fn strata_without_a_grid(context: &Context) -> Finding {
         most_added = most_added.max(f64::from(taken) / f64::from(n));
         match factor_pair(taken) {
             Some((rows, columns)) => {
-                let counts = cell_counts(&all(&sampler, pixel(n), &tickets.pixel), columns, rows);
+                let counts = cell_counts(&points("stratified", n, context.seed_of(1, 0)), columns, rows);
                 tally.fact(
                     format!("n = {n}, taken {taken} = {columns} × {rows}: {counts:?} points a cell"),
                     counts == (1, 1),
@@ -194,7 +194,7 @@ fn strata_drawn_twice(_: &Context) -> Finding {
             tally.fact(format!("{text}: points {n} to {} are refused", 2 * n - 1), refused);
             let twice = tickets.sampler(text, 2 * n, 1);
             let (rows, columns) = factor_pair(twice.samples()).expect("the count taken has a grid");
-            let counts = cell_counts(&all(&twice, pixel(0), &tickets.pixel), columns, rows);
+            let counts = cell_counts(&points(text, 2 * n, 1), columns, rows);
             tally.fact(
                 format!("{text} for {} points: {columns} × {rows} cells with {counts:?} points", 2 * n),
                 counts == (1, 1) && columns * rows >= 2 * n,

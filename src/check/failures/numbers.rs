@@ -2,6 +2,7 @@
 
 use crate::sampling::hash::unit_f32;
 use crate::sampling::radical::{PRIMES, radical_inverse_f64};
+use crate::sampling::strata::in_stratum;
 use crate::sampling::{MAX_SAMPLES, PixelKey, PointSource, Sampler};
 
 use super::super::{Check, Context, Finding, Kind, Tally};
@@ -32,7 +33,7 @@ pub fn checks() -> Vec<Check> {
         ),
         exact(
             "twenty-four-bits",
-            "cutting to 24 bits lowers the mean by 2⁻²⁵ and leaves every stratum alone; rounding moves points to the next one",
+            "cutting to 24 bits lowers the mean by 2⁻²⁵ and leaves every binary stratum alone; rounding moves points to the next one",
             &[3],
             twenty_four_bits,
         ),
@@ -168,6 +169,10 @@ fn twenty_four_bits(_: &Context) -> Finding {
     // Low bytes above the middle go up, and with odd words above them (three of the five) also the middle itself: ties go
     // to even.
     tally.fact(format!("{rounded} of 1280 words leave one when rounded"), rounded == 5 * 127 + 3);
+    // Strata whose edges are no binary fractions are met to 2⁻²⁴: the least fraction of the second of three falls below 1/3.
+    let third = in_stratum(1, 3, 0);
+    let below = 1.0 / 3.0 - f64::from(unit_f32(third));
+    tally.fact(format!("the edge 1/3 is missed by {below:.1e}"), below > 0.0 && below < 2f64.powi(-24));
     // The sampler itself: a scrambled set of 2¹⁶ points keeps each in its stratum of width 2⁻¹⁶.
     let tickets = Tickets::new();
     let sampler = tickets.sampler("ld:step:owen", 1 << 16, 1);

@@ -154,7 +154,7 @@ fn shared_covariance(x: u32, y: u32) -> f64 {
 fn one_scramble_for_two(context: &Context) -> Finding {
     let mut tally = Tally::new();
     let family = context.family(6);
-    let replicates = context.replicates(20_000, 2000);
+    let replicates = context.replicates(40_000, 40_000);
     let second = SobolAxis::new(1).expect("dimension 2 of 256");
     let n = 4u32;
     let set = |r: u32| -> Vec<[f64; 2]> {
