@@ -237,6 +237,7 @@ fn certify(context: &Context, wanted: fn(&SamplerSpec) -> bool) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampling::hash::{bits32, unit_f32};
 
     #[test]
     fn what_is_not_uniform_is_said_to_be_so() {
@@ -256,5 +257,25 @@ mod tests {
         assert!(!chi2_two_sided(&uneven, family).holds());
         let usual: Vec<u64> = (0..64).map(|i| [20, 30][i % 2]).collect();
         assert!(chi2_two_sided(&usual, family).holds());
+    }
+
+    /// Each alone is uniform: one key for both axes, a missing low bit, a number that leaves its cell.
+    #[test]
+    fn coupled_axes_missing_bits_and_strays_are_found() {
+        let family = Family { tests: 1000, false_alarm: 1e-8 };
+        let uniform: Vec<f64> = (0..1600).map(|i| f64::from(unit_f32(bits32(7, i)))).collect();
+        let other: Vec<f64> = (0..1600).map(|i| f64::from(unit_f32(bits32(8, i)))).collect();
+        let column = |values: &[f64], law| vec![Column { values: values.to_vec(), law }];
+        let fails = |axes: Vec<Vec<Column>>| {
+            let found = judge("test", axes, &[], family);
+            found.verdicts.iter().any(|(_, v)| !v.holds()) || found.facts.iter().any(|(_, holds)| !holds)
+        };
+        let free = Marginal::Uniform;
+        assert!(!fails(vec![column(&uniform, free), column(&other, free)]));
+        assert!(fails(vec![column(&uniform, free), column(&uniform, free)]), "one key");
+        let coarse: Vec<f64> = uniform.iter().map(|u| (u * 1024.0).floor() / 1024.0).collect();
+        assert!(fails(vec![column(&coarse, free), column(&other, free)]), "ten bits");
+        assert!(fails(vec![column(&uniform, Marginal::Cell { low: 0.0, width: 0.999 })]), "a stray");
+        assert!(fails(vec![column(&uniform, Marginal::Always(0.5))]), "not constant");
     }
 }

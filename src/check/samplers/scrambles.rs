@@ -17,7 +17,7 @@ use crate::check::{Check, Context, Finding, Kind, Tally};
 use crate::sampling::hash::bits64;
 use crate::sampling::radical::{PRIMES, digit_count, digit_scrambled};
 use crate::sampling::sobol::{SobolAxis, owen_scramble};
-use crate::sampling::{Decision, Order, Points, Random, Sampler, SamplerSpec};
+use crate::sampling::{Decision, Order, Random, Sampler, SamplerSpec};
 
 /// The checks of scrambles.
 pub fn checks() -> Vec<Check> {
@@ -302,7 +302,6 @@ fn digits_are_nested(context: &Context) -> Finding {
             }
         }
     }
-    debug_assert!(numbered_specs().iter().any(|s| s.points == Points::Halton));
     tally.saying("all pairs of 200 points in the bases 2 to 17, and b² points in b² strata for every digits sampler")
 }
 
