@@ -17,14 +17,18 @@
 mod answers;
 mod budgets;
 mod convergence;
-mod correlation;
+mod coupling;
 mod decisions;
 mod failures;
 mod flaws;
+mod gallery;
 mod identical;
+mod in_step;
+mod neighbours;
 mod opening;
 mod pictures;
 mod points;
+mod predicates;
 mod reference;
 mod scenes;
 mod shortcut;
@@ -49,6 +53,7 @@ mod titles {
     pub const PICTURES: &str = "Pictures at equal samples and at equal time";
     pub const SPEED: &str = "Speed against accuracy";
     pub const FAILURES: &str = "Where methods fail";
+    pub const GALLERY: &str = "A gallery of failures";
     pub const STABILITY: &str = "Stability";
     pub const SHORTCUT: &str = "The sheet's shortcut";
     pub const TABLE: &str = "Advantages and disadvantages";
@@ -59,7 +64,11 @@ mod titles {
 pub fn report(summary: &Summary, figures: &Figures) -> String {
     let mut page = Page::new();
     opening::title(summary, &mut page);
-    answers::section(summary, &mut page);
+    let tests = coupling::Tests::of(summary);
+    let neighbours = neighbours::NeighbourTests::of_all(summary);
+    let identity = identical::Identity::of(summary);
+    let asked = answers::Asked { samplers: &tests, neighbours: &neighbours, identity: &identity };
+    answers::section(summary, &asked, &mut page);
     page.contents();
     opening::what_was_run(summary, &mut page);
     opening::how_to_read(summary, &mut page);
@@ -68,19 +77,21 @@ pub fn report(summary: &Summary, figures: &Figures) -> String {
     points::figure_2(summary, figures, &mut page);
     points::discrepancy(summary, figures, &mut page);
     page.heading(2, "Independent or correlated");
-    points::within(summary, &mut page);
-    correlation::between_decisions(summary, &mut page);
-    correlation::between_pixels(summary, &mut page);
+    points::within(summary, &tests, &mut page);
+    in_step::between_decisions(summary, &tests, &mut page);
+    neighbours::between_pixels(summary, &neighbours, &mut page);
     decisions::section(summary, figures, &mut page);
-    identical::section(summary, &mut page);
+    identical::section(summary, &identity, &mut page);
     convergence::section(summary, figures, &mut page);
     convergence::bias_and_variance(summary, figures, &mut page);
     pictures::strips(summary, figures, &mut page);
     speed::section(summary, figures, &mut page);
     shortcut::section(summary, &mut page);
+    page.heading(2, titles::FAILURES);
+    gallery::section(summary, figures, &mut page);
     failures::section(summary, &mut page);
     stability::section(summary, figures, &mut page);
-    failures::table(summary, &mut page);
+    predicates::section(summary, &tests, &neighbours, &mut page);
     failures::limits(summary, &mut page);
     page.finish()
 }
