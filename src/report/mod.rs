@@ -33,6 +33,6 @@ mod pictured;
 mod sections;
 mod write;
 
-pub use sections::report as text;
+pub use sections::{Measurements, report as text, report_with as text_with};
 pub use summarise::{Summary, summarise};
 pub use write::{FigureState, Figures, Written, write};

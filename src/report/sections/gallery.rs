@@ -1,22 +1,20 @@
 //! Where methods fail: a gallery of known failures, each measured beside the sound way.
 
 use super::super::evidence::Answer;
-use super::super::gallery::{Evidence, Failure, measure};
+use super::super::gallery::{Evidence, Failure};
 use super::super::markdown::{Page, figure_ref};
 use super::super::numbers::{counted, estimate, listed, p_words, short};
-use super::super::summarise::Summary;
 use super::super::write::Figures;
 use super::words::times;
 use super::{show, tabulate, titles};
 
 /// The gallery: pictures, one line a failure, and how many of them the numbers show.
-pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
+pub fn section(all: &[Failure], figures: &Figures, page: &mut Page) {
     page.heading(3, titles::GALLERY);
-    let all = measure(summary.about.experiment.seed);
     page.paragraph(&format!(
         "Ways to spoil a sampler, each measured beside the sound way, from the samplers themselves and for this report; {}. A failure is shown where the truth is excluded (p < 0.001) of the failing way and not of the sound one, where \
          the ratio of the two lies above 1 with its whole 95 % interval, or where the two intervals lie apart.",
-        shown_words(&all)
+        shown_words(all)
     ));
     let caption = "Four failures as points, cyan (first) to red (last), origin at the bottom left; above the failing way, below the sound one. Left to right: x of the pixel against x of the lens, in step and shuffled \
                    (`stratified`, n = 256); dimensions 7 and 8 of Halton's sequence, n = 64, plain and with permuted digits; the first 128 of 256 points of Hammersley's set, and the set of 128; 7 samples in 9 cells and in 8 equal ones, \

@@ -7,16 +7,16 @@ use super::super::markdown::{Page, table_ref};
 use super::super::numbers::{estimate, listed, percent, short};
 use super::super::pairing;
 use super::super::summarise::{Cell, Summary};
-use super::coupling::{self, Tests};
+use super::coupling;
 use super::reference;
 use super::words::{
     against_one, bias_words, estimate_cell, level, limit_words, name, ratio_cell, rmse_ratio, row, rows, scene_name,
     scenes_by_lens, times,
 };
-use super::{tabulate, tabulate_folded, titles};
+use super::{Measurements, tabulate, tabulate_folded, titles};
 
 /// The literal reading against its cure.
-pub fn between_decisions(summary: &Summary, tests: &Tests, page: &mut Page) {
+pub fn between_decisions(summary: &Summary, measured: &Measurements, page: &mut Page) {
     page.heading(3, titles::DECISIONS);
     let pairs = summary.literal_pairs();
     if !pairs.is_empty() {
@@ -26,12 +26,12 @@ pub fn between_decisions(summary: &Summary, tests: &Tests, page: &mut Page) {
              and most combinations are never seen.",
         );
     }
-    coupling::between(summary, tests, page);
+    coupling::between(summary, &measured.tests, page);
     if pairs.is_empty() {
         page.paragraph("The literal reading of the sheet and its cure were not run side by side, so nothing is said of what decisions in step do to images.");
         return;
     }
-    pairing_table(summary, page);
+    pairing_table(summary, &measured.paired, page);
     let (with, without) = scenes_by_lens(summary);
     let (scenes, single): (Vec<usize>, Vec<usize>) =
         with.iter().chain(&without).copied().partition(|&scene| summary.scenes[scene].decisions.len() > 1);
@@ -57,10 +57,7 @@ pub fn between_decisions(summary: &Summary, tests: &Tests, page: &mut Page) {
 }
 
 /// What two decisions of one pixel do to an integrand that needs both.
-fn pairing_table(summary: &Summary, page: &mut Page) {
-    let measured: Vec<(usize, Vec<pairing::Paired>)> = (0..summary.samplers.len())
-        .filter_map(|i| Some((i, pairing::measure(&summary.samplers[i].spec()?, summary.about.experiment.seed)?)))
-        .collect();
+fn pairing_table(summary: &Summary, measured: &[(usize, Vec<pairing::Paired>)], page: &mut Page) {
     if measured.is_empty() {
         return;
     }

@@ -36,7 +36,9 @@ mod speed;
 mod stability;
 mod words;
 
+use super::gallery::Failure;
 use super::markdown::Page;
+use super::pairing::{self, Paired};
 use super::summarise::Summary;
 use super::write::{FigureState, Figures};
 
@@ -60,14 +62,42 @@ mod titles {
     pub const LIMITS: &str = "Limits";
 }
 
+/// What a report asks of the samplers themselves, beyond the rows: a function of the experiment's samplers and seed alone.
+pub struct Measurements {
+    /// Within sets and between decisions.
+    tests: coupling::Tests,
+    /// Two decisions and an integrand that needs both, by sampler.
+    paired: Vec<(usize, Vec<Paired>)>,
+    /// Failures of methods.
+    gallery: Vec<Failure>,
+}
+
+impl Measurements {
+    /// Measures everything: less than a second.
+    pub fn of(summary: &Summary) -> Self {
+        let seed = summary.about.experiment.seed;
+        let paired = |i: usize| Some((i, pairing::measure(&summary.samplers[i].spec()?, seed)?));
+        Self {
+            tests: coupling::Tests::of(summary),
+            paired: (0..summary.samplers.len()).filter_map(paired).collect(),
+            gallery: super::gallery::measure(seed),
+        }
+    }
+}
+
 /// `report.md`.
 pub fn report(summary: &Summary, figures: &Figures) -> String {
+    report_with(summary, figures, &Measurements::of(summary))
+}
+
+/// [`report`] with measurements that were made before, for several reports of the same samplers and seed.
+pub fn report_with(summary: &Summary, figures: &Figures, measured: &Measurements) -> String {
     let mut page = Page::new();
     opening::title(summary, &mut page);
-    let tests = coupling::Tests::of(summary);
+    let tests = &measured.tests;
     let neighbours = neighbours::NeighbourTests::of_all(summary);
     let identity = identical::Identity::of(summary);
-    let asked = answers::Asked { samplers: &tests, neighbours: &neighbours, identity: &identity };
+    let asked = answers::Asked { samplers: tests, neighbours: &neighbours, identity: &identity };
     answers::section(summary, &asked, &mut page);
     page.contents();
     opening::what_was_run(summary, &mut page);
@@ -77,8 +107,8 @@ pub fn report(summary: &Summary, figures: &Figures) -> String {
     points::figure_2(summary, figures, &mut page);
     points::discrepancy(summary, figures, &mut page);
     page.heading(2, "Independent or correlated");
-    points::within(summary, &tests, &mut page);
-    in_step::between_decisions(summary, &tests, &mut page);
+    points::within(summary, tests, &mut page);
+    in_step::between_decisions(summary, measured, &mut page);
     neighbours::between_pixels(summary, &neighbours, &mut page);
     decisions::section(summary, figures, &mut page);
     identical::section(summary, &identity, &mut page);
@@ -88,10 +118,10 @@ pub fn report(summary: &Summary, figures: &Figures) -> String {
     speed::section(summary, figures, &mut page);
     shortcut::section(summary, &mut page);
     page.heading(2, titles::FAILURES);
-    gallery::section(summary, figures, &mut page);
+    gallery::section(&measured.gallery, figures, &mut page);
     failures::section(summary, &mut page);
     stability::section(summary, figures, &mut page);
-    predicates::section(summary, &tests, &neighbours, &mut page);
+    predicates::section(summary, tests, &neighbours, &mut page);
     failures::limits(summary, &mut page);
     page.finish()
 }
