@@ -129,7 +129,7 @@ mod tests {
         assert!((shift / 256.0 - 1.0).abs() < 0.4 && (owen - 1.0).abs() < 0.4, "{shift} {owen}");
         assert!(number("in step")[0] < 0.01);
         let [single, integer] = number("single precision");
-        assert!(single == 0.0 && integer > 0.0);
+        assert!(single <= 0.0 && integer > 0.0, "{single} {integer}");
         assert_eq!(number("shifted modulo")[1], 0.0, "a scrambled net is a net");
         assert_eq!(panels(4).unwrap().len(), 8);
     }

@@ -92,7 +92,7 @@ pub fn high_bases(seed: u64) -> Option<Failure> {
     })
 }
 
-/// The last index below 3¹⁴ whose inverse, as a single-precision product, is 1.
+/// 3¹⁴ − 1, all digits 2: its inverse is 1 − 3⁻¹⁴, which as a single-precision product is not below 1.
 const INDEX: u32 = 4_782_968;
 
 /// Van der Corput's loop in single precision: the digits reversed, times 3⁻ᵏ.
@@ -113,7 +113,7 @@ pub fn single_precision() -> Option<Failure> {
         failing: Side { way: "a loop over f32", number: exact(1.0 - f64::from(single(3, INDEX))) },
         sound: Side { way: "halton", number: exact(1.0 - f64::from(unit_f32(radical_inverse(3, INDEX)))) },
         evidence: Evidence::Apart { larger_is_worse: false },
-        cause: "1 − 3⁻¹⁴ rounds to 1: the sample lies outside its pixel, an array index past its end",
+        cause: "1 − 3⁻¹⁴ rounds to 1 or above: the sample lies outside its pixel, an array index past its end",
         remedy: "integers to the end, then round down",
     })
 }
