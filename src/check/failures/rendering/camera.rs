@@ -12,6 +12,7 @@ use crate::sampling::warp::square_to_disk;
 use crate::scene::camera::Aperture;
 use crate::scene::compile::{Scene, Stage};
 use crate::scene::config::{CameraConfig, SceneConfig};
+use crate::scene::mesh::Mesh;
 use crate::stats::{Moments, t_test};
 
 /// The checks of this file.
@@ -53,7 +54,7 @@ pub fn checks() -> Vec<Check> {
             CAMERA,
             &[58],
             "lens-radius-ends",
-            "a lens of radius 0 is a pinhole bit for bit; one of 1e9 gives finite rays and a finite picture",
+            "a lens of radius 0 is a pinhole bit for bit; one of 1e9 gives finite rays and a finite picture; what overflows is refused",
             Kind::Exact,
             lens_radius,
         ),
@@ -130,6 +131,14 @@ fn before_wall(camera: &CameraConfig) -> Scene {
     let white = room.material(0.8, None);
     room.polygon(&parallelogram(camera.pos + dir * 2.0, side * 3.0, dir.cross(side) * 3.0), white);
     room.scene(camera, (9, 7), Stage::Dof)
+}
+
+/// What compiling a scene says of a lens that single precision cannot hold.
+fn overflowing(lens_radius: f32, focal_depth: f32) -> String {
+    let camera = CameraConfig { lens_radius, focal_depth, ..looking_at(Vec3::ZERO, Vec3::Z, 50.0) };
+    let config = SceneConfig { camera, auto_focus: false, ..SceneConfig::default() };
+    let scene = Scene::new(&config, Mesh::default(), (1, 1), Stage::Dof);
+    scene.err().map_or_else(|| "accepted".to_owned(), |error| error.to_string())
 }
 
 /// Are all rays of the picture's corners and middle finite, with a direction of length 1?
@@ -226,6 +235,8 @@ fn lens_radius(context: &Context) -> Finding {
     for value in ["-1", "-1e-9", "NaN", "1e999"] {
         refused(&mut tally, &[(&[&format!("camera.lens_radius={value}")], "camera.lens_radius", expected)]);
     }
+    let said = overflowing(1e25, 1.0);
+    tally.fact(format!("radius 1e25: {said}"), said.starts_with("camera.lens_radius: expected a length up to 5e11"));
     tally.saying("radius 0: 4096 rays and the picture are the pinhole's bit for bit; 1e9: all finite")
 }
 
@@ -237,6 +248,11 @@ fn focal_depth(_: &Context) -> Finding {
     for value in ["1e-6", "1e6", "3e38"] {
         accepted(&mut tally, &[&format!("camera.focal_depth={value}"), "camera.lens_radius=0.1"]);
     }
+    let said = overflowing(0.1, 1e-25);
+    tally.fact(
+        format!("depth 1e-25 behind a lens of 0.1: {said}"),
+        said.starts_with("camera.focal_depth: expected at least"),
+    );
     let scene = before_wall(&looking_at(Vec3::ZERO, Vec3::Z, 50.0));
     for u in [Vec2::ZERO, Vec2::splat(0.5), Vec2::new(0.9, 0.3)] {
         let at = Vec2::new(2.0, 5.0);
