@@ -1,11 +1,14 @@
 //! A pixel crossed by a straight edge: its value is the covered area, and its noise that of independent coins.
 
+use glam::Vec3;
+
 use super::random_edge::half_plane;
 use super::reference::coverages;
-use super::{Check, Context, Finding, statistical};
+use super::{Check, Context, Finding, exact, statistical};
 use crate::analytic::pixel_coverage;
 use crate::check::Tally;
-use crate::check::room::{replicates, spec};
+use crate::check::room::{Room, grey, looking_at, parallelogram, rendered, replicates, spec};
+use crate::scene::compile::Stage;
 use crate::stats::hypothesis::clopper_pearson;
 use crate::stats::{Moments, t_test};
 
@@ -17,6 +20,11 @@ pub fn checks() -> Vec<Check> {
             "random samples see an edge in as large a share as it covers of the pixel, and as 0 or 1",
             coverage,
         ),
+        exact(
+            "orientation",
+            "left is left and up is up: each quarter of a picture shows its own quarter of the scene",
+            orientation,
+        ),
         statistical("edge-noise", "the mean of n random samples of an edge has variance p(1 − p)/n", noise),
         statistical("edge-diagonals", "every unbiased sampler sees the exact coverage on both diagonals", diagonals),
         statistical(
@@ -25,6 +33,21 @@ pub fn checks() -> Vec<Check> {
             noise_of_sets,
         ),
     ]
+}
+
+/// A camera at the origin along +z with +y up has +x on its left. Catches a picture that is mirrored or upside down, which no single
+/// pixel's coverage would show.
+fn orientation(context: &Context) -> Finding {
+    let mut room = Room::default();
+    for (k, (x, y)) in [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)].into_iter().enumerate() {
+        let shade = room.material(0.25 * k as f32, None);
+        room.polygon(&parallelogram(Vec3::new(x, y, 1.0), Vec3::X, Vec3::Y), shade);
+    }
+    let scene = room.scene(&looking_at(Vec3::ZERO, Vec3::Z, 80.0), (2, 2), Stage::Aa);
+    let seen = grey(&rendered(&scene, spec("ld"), 16, context.seed));
+    let mut tally = Tally::new();
+    tally.fact(format!("quarters, row by row: {seen:?}"), seen == [0.0, 0.25, 0.5, 0.75]);
+    tally.finish()
 }
 
 /// Samples a pixel of one image.

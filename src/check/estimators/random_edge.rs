@@ -102,7 +102,7 @@ pub(in crate::check) fn half_plane([a, b, c]: [f64; 3], depth: f64, lens: Option
     room.scene(&camera, (1, 1), Stage::Dof)
 }
 
-/// Catches a bias of 1 to 2 % of the pixel: a wrong radius of the blur, a filter wider than the pixel, y upside down.
+/// Catches a bias of 1 to 2 % of the pixel: a wrong radius of the blur, a filter wider than the pixel.
 fn random_edges(context: &Context) -> Finding {
     let edges = context.replicates(48, 12);
     let family = context.family(edges);
