@@ -10,6 +10,7 @@ mod counts;
 mod domains;
 mod net_counts;
 mod numbers;
+mod rendering;
 mod room;
 mod scrambles;
 mod sharing;
@@ -26,6 +27,7 @@ pub fn checks() -> Vec<Check> {
         net_counts::checks(),
         domains::checks(),
         scrambles::checks(),
+        rendering::checks(),
     ]
     .concat()
 }
