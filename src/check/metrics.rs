@@ -308,15 +308,14 @@ fn spectrum_of_random_points(context: &Context) -> Finding {
 
 #[cfg(test)]
 mod tests {
-    use crate::check::{Settings, failures, run};
+    use crate::check::{Settings, run};
 
-    /// At their default settings, of which each fails with probability below 1e-6 in all.
+    /// Two of them throw dice, each at its share of 1e-7 for all checks there are.
     #[test]
-    fn the_checks_of_metrics_and_of_their_failures_hold() {
-        for check in super::checks().iter().chain(&failures::checks()).filter(|c| c.group.ends_with("metrics")) {
-            let started = std::time::Instant::now();
-            let found = run(check, &Settings::default()).finding;
-            println!("{} ({:.2} s): {}", check.name, started.elapsed().as_secs_f64(), found.says);
+    fn the_checks_of_metrics_hold() {
+        for check in super::checks() {
+            let found = run(&check, &Settings { alpha: 1e-7, ..Settings::default() }).finding;
+            println!("{}: {}", check.name, found.says);
             assert!(found.passed, "{}: {}", check.name, found.says);
         }
     }
