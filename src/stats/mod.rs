@@ -9,7 +9,7 @@
 //! | how far is an image from its reference | [`image_error`], [`trimmed`] |
 //! | how fast does the error fall | [`fit`] |
 //! | does an estimator agree with the truth | [`hypothesis`] |
-//! | how even is a point set | [`discrepancy`] |
+//! | how even is a point set | [`discrepancy`], [`spectrum`] |
 
 pub mod discrepancy;
 pub mod fit;
@@ -17,6 +17,7 @@ pub mod hypothesis;
 pub mod image_error;
 pub mod moments;
 mod special;
+pub mod spectrum;
 pub mod trimmed;
 
 pub use discrepancy::{L2Kind, Points, PointsError, Side, Star};

@@ -8,6 +8,7 @@ mod common;
 mod correlation;
 mod counts;
 mod domains;
+mod metrics;
 mod net_counts;
 mod numbers;
 mod rendering;
@@ -28,6 +29,7 @@ pub fn checks() -> Vec<Check> {
         domains::checks(),
         scrambles::checks(),
         rendering::checks(),
+        metrics::checks(),
     ]
     .concat()
 }
