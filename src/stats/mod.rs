@@ -7,12 +7,14 @@
 //! |---|---|
 //! | mean, variance, intervals | [`moments`] |
 //! | how far is an image from its reference | [`image_error`], [`trimmed`] |
+//! | how different do two pictures look | [`flip`] |
 //! | how fast does the error fall | [`fit`] |
 //! | does an estimator agree with the truth | [`hypothesis`] |
 //! | how even is a point set | [`discrepancy`] |
 
 pub mod discrepancy;
 pub mod fit;
+pub mod flip;
 pub mod hypothesis;
 pub mod image_error;
 pub mod moments;
