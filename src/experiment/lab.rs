@@ -20,7 +20,7 @@ use crate::scene::scale::scaled;
 use crate::stats::discrepancy::{L2Kind, Points, l2_root, min_toroidal_distance, star_2d, t_value};
 
 /// Raised whenever the bits of image errors or point-set metrics may change.
-pub const METRICS_ALGORITHM: u32 = 1;
+pub const METRICS_ALGORITHM: u32 = 2;
 
 /// Raised whenever the weighting of lights changes.
 pub const ESTIMATOR_ALGORITHM: u32 = 1;

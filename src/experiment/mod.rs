@@ -28,6 +28,7 @@ mod measure;
 pub mod merge;
 pub mod origin;
 mod pictures;
+mod pixels;
 pub mod plan;
 pub mod progress;
 pub mod results;

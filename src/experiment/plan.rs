@@ -311,6 +311,14 @@ impl Plan {
         self.positions.get(id).copied()
     }
 
+    /// Exposure at which a scene is looked at.
+    ///
+    /// # Panics
+    /// Where the plan has no such scene.
+    pub fn exposure(&self, scene: &str) -> f32 {
+        self.scenes.iter().find(|facts| facts.name == scene).expect("items are of the plan's scenes").exposure
+    }
+
     /// What the experiment calls a sampler.
     pub fn names(&self, canonical: &str) -> &[String] {
         let known = self.samplers.iter().chain([&self.reference_sampler]);

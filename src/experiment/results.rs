@@ -17,6 +17,7 @@ use super::identity::{ID_LENGTH, pixel_hash};
 use super::lines::{line, lines, sound_lines};
 use crate::error::{Error, Result};
 use crate::film::{Image, read_exr};
+pub use crate::stats::ErrorSpectrum;
 use crate::stats::Estimate;
 
 /// Version of the row format, field `schema`.
@@ -157,6 +158,13 @@ pub struct ImageErrors {
     pub bias: f64,
     /// Correlation of the error between neighbouring pixels; null where the error is not above the reference's noise.
     pub error_autocorrelation: Option<f64>,
+    /// FLIP, how different it looks from the reference at the scene's exposure, 0 to 1, mean over the pixels: perceptual, saturates,
+    /// and no estimate of any of the above. Rows of earlier versions do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flip: Option<f64>,
+    /// The value below which pixels make up half of the sum.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flip_weighted_median: Option<f64>,
 }
 
 /// A difference of more than this share of the mean is called a jump; f32 images that differ by roundings differ by 1e−6.
@@ -312,6 +320,12 @@ pub struct EnsembleRow {
     pub bias: Estimate,
     /// Correlation of the error between neighbouring pixels; null where a replicate's is not defined.
     pub error_autocorrelation: Option<Estimate>,
+    /// Mean FLIP of the replicates at the scene's exposure; rows of earlier versions do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flip: Option<Estimate>,
+    /// Power of the error images by frequency, where they were made plainly.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error_spectrum: Option<ErrorSpectrum>,
     /// Ids of the replicates.
     pub members: Vec<String>,
     /// What it was made with; rows of earlier versions do not say.
@@ -555,6 +569,8 @@ mod tests {
                 mae: 5e-324,
                 bias: -0.0,
                 error_autocorrelation: None,
+                flip: None,
+                flip_weighted_median: None,
             }),
         })
     }

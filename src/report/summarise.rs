@@ -8,8 +8,8 @@ mod variants;
 use std::collections::HashMap;
 
 use crate::experiment::results::{
-    About, Count, EnsembleRow, Estimator, ImageRow, Kind, PointsRow, ReferenceRow, Row, SceneFacts, Stage, Timing,
-    TwinDifference, Variant, is_enough,
+    About, Count, EnsembleRow, ErrorSpectrum, Estimator, ImageRow, Kind, PointsRow, ReferenceRow, Row, SceneFacts,
+    Stage, Timing, TwinDifference, Variant, is_enough,
 };
 use crate::experiment::spec::{Experiment, Pictures, SamplerEntry};
 use crate::sampling::{Decision, Order, Points, Preset, Random, SamplerSet, SamplerSpec, Scope};
@@ -183,6 +183,10 @@ pub struct Cell {
     pub bias: Estimate,
     /// Correlation of the error between neighbouring pixels.
     pub error_autocorrelation: Option<Estimate>,
+    /// Mean FLIP of the replicates: how different they look, no estimate of the errors above.
+    pub flip: Option<Estimate>,
+    /// Power of the error images by frequency.
+    pub error_spectrum: Option<ErrorSpectrum>,
     /// Unbiased mean square error of each replicate whose row is there.
     pub replicate_mse: Vec<f64>,
     /// Mean radiance of each replicate whose row is there.
@@ -640,6 +644,8 @@ impl<'a> Index<'a> {
             bias: known(row.bias),
             // One image's correlation has no spread over replicates; of a fixed sampler it is all there is.
             error_autocorrelation: row.error_autocorrelation,
+            flip: row.flip,
+            error_spectrum: row.error_spectrum.clone(),
             replicate_mse: members.iter().filter_map(|m| m.errors.as_ref()).map(|e| e.mse_unbiased).collect(),
             replicate_mean: members.iter().map(|m| m.mean).collect(),
             pixels: members.iter().map(|m| m.pixels.clone()).collect(),

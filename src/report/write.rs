@@ -108,6 +108,7 @@ fn draw(dir: &Path, summary: &Summary) -> Result<Figures> {
     let no_rows = || "its rows are not there".to_owned();
     pen.raster("point-sets", charts::point_sets(summary).ok_or_else(no_rows))?;
     pen.chart("discrepancy", charts::discrepancy(summary))?;
+    pen.chart("error-spectrum", charts::error_spectrum(summary))?;
     pen.chart("convergence", charts::convergence(summary))?;
     pen.chart("bias-and-variance", charts::bias_and_variance(summary))?;
     pen.chart("stability", charts::stability(summary))?;

@@ -24,6 +24,7 @@ mod flaws;
 mod identical;
 mod opening;
 mod pictures;
+mod pixels;
 mod points;
 mod reference;
 mod scenes;
@@ -35,6 +36,7 @@ mod words;
 use super::markdown::Page;
 use super::summarise::Summary;
 use super::write::{FigureState, Figures};
+pub use correlation::pattern_spp;
 
 /// Names of sections that others link to.
 mod titles {
@@ -71,6 +73,7 @@ pub fn report(summary: &Summary, figures: &Figures) -> String {
     points::within(summary, &mut page);
     correlation::between_decisions(summary, &mut page);
     correlation::between_pixels(summary, &mut page);
+    pixels::spectra(summary, figures, &mut page);
     decisions::section(summary, figures, &mut page);
     identical::section(summary, &mut page);
     convergence::section(summary, figures, &mut page);
