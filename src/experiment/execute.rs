@@ -26,6 +26,7 @@ use super::measure::{self, ReferenceImages};
 use super::origin::Origin;
 use super::pixels;
 use super::plan::{EnsembleWork, ImageWork, Plan, PointsWork, ReferenceSource, ReferenceWork, Work, WorkItem};
+use super::prediction;
 use super::progress::{Meter, Progress};
 use super::results::{
     self, EnsembleRow, ImageErrors, ImageRow, Kind, PointsRow, ReferenceRow, Row, SCHEMA, Source, Timing, read_image,
@@ -413,6 +414,10 @@ impl<'a> Run<'a> {
             Work::Reference(work) => self.reference_row(item, work).map(Row::Reference),
             Work::Ensemble(work) => self.ensemble_row(item, work).map(Row::Ensemble),
             Work::Points(work) => self.points_row(item, work).map(Row::Points),
+            Work::Prediction(work) => {
+                let found = self.backend.predict(work, self.options.threads)?;
+                Ok(Row::Prediction(prediction::row(item, work, found)))
+            }
         }
     }
 
@@ -518,7 +523,7 @@ impl<'a> Run<'a> {
             bias: e.bias,
             error_autocorrelation,
             flip: Some(t_interval(&flips, 0.95).with_rounded_interval()),
-            error_spectrum: work.variant.is_plain().then(|| pixels::spectrum(&members, &reference)),
+            error_spectrum: work.variant.is_plain().then(|| Box::new(pixels::spectrum(&members, &reference))),
             members: work.members.clone(),
             made_with: None,
         })

@@ -30,6 +30,7 @@ pub mod origin;
 mod pictures;
 mod pixels;
 pub mod plan;
+pub mod prediction;
 pub mod progress;
 pub mod results;
 pub mod shards;

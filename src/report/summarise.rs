@@ -8,8 +8,8 @@ mod variants;
 use std::collections::HashMap;
 
 use crate::experiment::results::{
-    About, Count, EnsembleRow, ErrorSpectrum, Estimator, ImageRow, Kind, PointsRow, ReferenceRow, Row, SceneFacts,
-    Stage, Timing, TwinDifference, Variant, is_enough,
+    About, Count, EnsembleRow, ErrorSpectrum, Estimator, ImageRow, Kind, PointsRow, PredictionRow, ReferenceRow, Row,
+    SceneFacts, Stage, Timing, TwinDifference, Variant, is_enough,
 };
 use crate::experiment::spec::{Experiment, Pictures, SamplerEntry};
 use crate::sampling::{Decision, Order, Points, Preset, Random, SamplerSet, SamplerSpec, Scope};
@@ -55,6 +55,8 @@ pub struct Summary {
     pub speeds: Vec<Speed>,
     /// Sets that are not compared in a scene: scene, sampler, and the sampler that means the same there.
     pub left_out: Vec<(usize, usize, usize)>,
+    /// Variances of pixels, predicted and measured.
+    pub predictions: Vec<PredictionRow>,
     /// What is not there, in words.
     pub missing: Vec<String>,
 }
@@ -419,6 +421,7 @@ pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
         pictured: Vec::new(),
         speeds: Vec::new(),
         left_out: Vec::new(),
+        predictions: Vec::new(),
         missing: Vec::new(),
     };
     summary.left_out = left_out(&summary, about);
@@ -429,6 +432,7 @@ pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
     index.add_points(&mut summary);
     index.add_pictures(&mut summary, timings);
     index.add_speeds(&mut summary, timings);
+    index.add_predictions(&mut summary);
     summary
 }
 
@@ -504,6 +508,7 @@ struct Index<'a> {
     /// [`Summary::reference_share`].
     share: f64,
     points: HashMap<(&'a str, u32), Vec<&'a PointsRow>>,
+    predictions: Vec<&'a PredictionRow>,
     pictures: Vec<&'a ImageRow>,
     stages: Vec<&'a ImageRow>,
 }
@@ -517,6 +522,7 @@ impl<'a> Index<'a> {
             primary: experiment.estimator.primary(),
             share: reference_share(experiment),
             points: HashMap::new(),
+            predictions: Vec::new(),
             pictures: Vec::new(),
             stages: Vec::new(),
         };
@@ -533,6 +539,7 @@ impl<'a> Index<'a> {
                     sets.retain(|other| other.replicate != row.replicate);
                     sets.push(row);
                 }
+                Row::Prediction(row) => index.predictions.push(row),
                 Row::Image(row) => {
                     index.images.insert(&row.id, row);
                     match row.kind {
@@ -583,6 +590,19 @@ impl<'a> Index<'a> {
             pixels: size.pixels(),
             reference: by_id.or(by_size.first().copied()).cloned(),
         }
+    }
+
+    /// Predictions, those that are exact first; the others are missing.
+    fn add_predictions(&self, summary: &mut Summary) {
+        let Some(asked_for) = &summary.about.experiment.prediction else { return };
+        let planned = asked_for.samplers.len() * asked_for.spp.len();
+        let mut found: Vec<PredictionRow> = self.predictions.iter().map(|&row| row.clone()).collect();
+        found.sort_by_key(|row| (!row.is_stationary, row.sampler.clone(), row.spp.asked));
+        found.dedup_by(|a, b| a.id == b.id);
+        if found.len() < planned {
+            summary.missing.push(format!("{} of {planned} predicted variances", planned - found.len()));
+        }
+        summary.predictions = found;
     }
 
     /// One cell for each ensemble that is there; the others are missing.
@@ -645,7 +665,7 @@ impl<'a> Index<'a> {
             // One image's correlation has no spread over replicates; of a fixed sampler it is all there is.
             error_autocorrelation: row.error_autocorrelation,
             flip: row.flip,
-            error_spectrum: row.error_spectrum.clone(),
+            error_spectrum: row.error_spectrum.as_deref().cloned(),
             replicate_mse: members.iter().filter_map(|m| m.errors.as_ref()).map(|e| e.mse_unbiased).collect(),
             replicate_mean: members.iter().map(|m| m.mean).collect(),
             pixels: members.iter().map(|m| m.pixels.clone()).collect(),

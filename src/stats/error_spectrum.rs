@@ -316,7 +316,7 @@ mod tests {
         let mut random = Pcg64::new(3, 1);
         let powers: Vec<Power> = (0..400)
             .map(|_| {
-                let size = |p: usize| if p % 7 == 0 { 20.0 } else { (p % 5) as f64 };
+                let size = |p: usize| if p.is_multiple_of(7) { 20.0 } else { (p % 5) as f64 };
                 let d: Vec<[f64; 3]> = (0..n).map(|p| [uniform(&mut random).signum() * size(p); 3]).collect();
                 Power::of(&d, &zero, &zero, width)
             })

@@ -44,7 +44,7 @@ impl Fourier {
             out[0] = values[0];
             return;
         }
-        let factor = (2..).find(|p| n % p == 0 || p * p > n).filter(|p| n % p == 0).unwrap_or(n);
+        let factor = (2..).take_while(|p| p * p <= n).find(|&p| n.is_multiple_of(p)).unwrap_or(n);
         let part = n / factor;
         for (r, out) in out.chunks_exact_mut(part).enumerate() {
             self.step(&values[r * stride..], stride * factor, out, scratch);

@@ -9,6 +9,7 @@
 //! | how far is an image from its reference | [`image_error`], [`trimmed`] |
 //! | how different do two pictures look | [`flip`] |
 //! | do neighbouring pixels err together | [`error_spectrum`], by a transform of any length in [`fourier`] |
+//! | how much does a pixel vary, from spectra | [`pixel_variance`] |
 //! | how fast does the error fall | [`fit`] |
 //! | does an estimator agree with the truth | [`hypothesis`] |
 //! | how even is a point set | [`discrepancy`] |
@@ -21,6 +22,7 @@ pub mod fourier;
 pub mod hypothesis;
 pub mod image_error;
 pub mod moments;
+pub mod pixel_variance;
 mod special;
 pub mod trimmed;
 

@@ -26,6 +26,7 @@ mod opening;
 mod pictures;
 mod pixels;
 mod points;
+mod prediction;
 mod reference;
 mod scenes;
 mod shortcut;
@@ -48,6 +49,7 @@ mod titles {
     pub const IDENTICAL: &str = "Identical";
     pub const CONVERGENCE: &str = "Convergence";
     pub const BIAS: &str = "Bias and variance";
+    pub const PREDICTION: &str = "Predicted pixel variance";
     pub const PICTURES: &str = "Pictures at equal samples and at equal time";
     pub const SPEED: &str = "Speed against accuracy";
     pub const FAILURES: &str = "Where methods fail";
@@ -78,6 +80,7 @@ pub fn report(summary: &Summary, figures: &Figures) -> String {
     identical::section(summary, &mut page);
     convergence::section(summary, figures, &mut page);
     convergence::bias_and_variance(summary, figures, &mut page);
+    prediction::section(summary, &mut page);
     pictures::strips(summary, figures, &mut page);
     speed::section(summary, figures, &mut page);
     shortcut::section(summary, &mut page);

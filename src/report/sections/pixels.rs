@@ -82,7 +82,7 @@ fn verdict(summary: &Summary, all: &[Tested]) -> String {
     let is_found = |t: &&Tested| t.p.is_some_and(|p| p < LEVEL);
     let words = |t: &Tested| {
         let ratio = t.ratio.map(|ratio| times(&ratio)).unwrap_or_default();
-        format!("{} in {} ({ratio})", name(summary, t.cell.sampler), scene_name(summary, t.cell.scene))
+        format!("{} in {} ({ratio} times)", name(summary, t.cell.sampler), scene_name(summary, t.cell.scene))
     };
     let side = |low: bool| -> Vec<String> {
         let is_side = |t: &&Tested| t.ratio.is_some_and(|ratio| (ratio.value > 1.0) == low);
@@ -116,15 +116,16 @@ fn fixed(summary: &Summary, all: &[Tested]) -> String {
         .filter(|t| t.cell.is_fixed)
         .filter_map(|t| {
             let ratio = short(t.ratio?.value);
-            Some(format!("{} in {} {ratio} times", name(summary, t.cell.sampler), scene_name(summary, t.cell.scene)))
+            Some(format!(
+                "{ratio} times that share for {} in {}",
+                name(summary, t.cell.sampler),
+                scene_name(summary, t.cell.scene)
+            ))
         })
         .collect();
     match fixed.is_empty() {
         true => String::new(),
-        false => format!(
-            "Without replicates nothing can be tested; the one image there is has that share of independent pixels {}.",
-            listed(&fixed)
-        ),
+        false => format!("Without replicates nothing can be tested; the one image there is has {}.", listed(&fixed)),
     }
 }
 
