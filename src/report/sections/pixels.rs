@@ -9,7 +9,7 @@ use super::super::markdown::{Page, figure_ref, table_ref};
 use super::super::numbers::{counted, listed, percent, short};
 use super::super::summarise::{Cell, Summary};
 use super::super::write::Figures;
-use super::correlation::pattern_spp;
+use super::neighbours::pattern_spp;
 use super::words::{level, marked_row, name, ratio_cell, scene_name, times};
 use super::{show, tabulate_folded};
 
