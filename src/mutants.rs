@@ -83,7 +83,7 @@ mutants! {
     WaldInterval = "wald-interval" in "stats": "p ± z √(p(1 − p)/n) in place of Clopper and Pearson's interval", caught by "quick-tests";
     ReferenceNoiseKept = "reference-noise-kept" in "stats": "both factors of the unbiased MSE from one reference", caught by "quick-errors";
     StarWithoutOne = "star-without-one" in "stats": "star discrepancy by boxes with corners at sample points alone, never at 1", caught by "quick-errors";
-    L2WithoutDiagonal = "l2-without-diagonal" in "stats": "pairs i ≠ j alone in the double sum", caught by "quick-errors";
+    L2WithoutDiagonal = "l2-without-diagonal" in "stats": "pairs i ≠ j alone in the double sum of an L2 discrepancy", caught by "quick-errors";
 }
 
 impl Mutant {

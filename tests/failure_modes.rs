@@ -51,6 +51,21 @@ fn scrambles() {
     run_group("failures: scrambles");
 }
 
+#[test]
+fn lights() {
+    run_group("failures: lights");
+}
+
+#[test]
+fn camera() {
+    run_group("failures: camera");
+}
+
+#[test]
+fn metrics() {
+    run_group("failures: metrics");
+}
+
 /// A row without a check is a failure that nobody would notice.
 #[test]
 fn every_row_of_the_catalogue_has_a_check() {

@@ -18,6 +18,7 @@ pub mod metrics;
 #[cfg(feature = "mutants")]
 pub mod planted;
 pub mod quick;
+pub mod room;
 pub mod samplers;
 pub mod scene;
 pub mod statistics;

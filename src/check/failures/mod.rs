@@ -8,8 +8,10 @@ mod common;
 mod correlation;
 mod counts;
 mod domains;
+mod metrics;
 mod net_counts;
 mod numbers;
+mod rendering;
 mod room;
 mod scrambles;
 mod sharing;
@@ -26,6 +28,8 @@ pub fn checks() -> Vec<Check> {
         net_counts::checks(),
         domains::checks(),
         scrambles::checks(),
+        rendering::checks(),
+        metrics::checks(),
     ]
     .concat()
 }

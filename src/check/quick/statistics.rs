@@ -82,8 +82,9 @@ fn errors(_: &Context) -> Finding {
         0.9,
         DIGITS,
     );
-    // (13/12)² − 2 + 1: the middle is as near to every corner.
-    let centred = discrepancy::l2_squared(&point(0.5, 0.5), L2Kind::Centred);
-    tally.near("centred L2 of the middle, squared", centred.unwrap_or(f64::NAN), 25.0 / 144.0, DIGITS);
+    // (13/12)³ − 2 + 1: the middle is as near to every corner.
+    let middle = Points::new(3, vec![0.5; 3]).expect("a point of the cube");
+    let centred = discrepancy::l2_squared(&middle, L2Kind::Centred);
+    tally.near("centred L2 of the cube's middle, squared", centred.unwrap_or(f64::NAN), 469.0 / 1728.0, DIGITS);
     tally.finish()
 }
