@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::check::scene::tiles::{Comparison, Series, Tiling, Truth, by_place, compare};
+use crate::check::scene::tiles::{Comparison, Rules, Series, Tiling, Truth, by_place, compare};
 use crate::check::{Context, Finding, Tally};
 use crate::render::render;
 use crate::sampling::{Preset, Sampler, SamplerSpec};
@@ -15,6 +15,8 @@ use crate::stats::hypothesis::two_sided;
 use crate::stats::student_t_quantile;
 
 use super::{Draws, LEVEL, is_compatible, share};
+
+const RULES: Rules = Rules { allowance: 0.0, unseen: 0.0, level: LEVEL };
 
 /// Tilted stripes, white on dark and finer than a pixel, and above them a dark half in which bright specks are hit rarely:
 /// what makes tests on pixels lie.
@@ -78,7 +80,7 @@ pub fn null_tiles(context: &Context) -> Finding {
     let runs = u64::from(context.replicates(1_000, 1_000));
     let alarm = |run: u64| -> Option<bool> {
         let (a, b) = (series(run, 0)?, series(run, 1)?);
-        Some(compare(&tiling, &a, &Truth::Replicates(&b), 0.0, LEVEL).p < LEVEL)
+        Some(compare(&tiling, &a, &Truth::Replicates(&b), RULES).p < LEVEL)
     };
     let alarms: Option<Vec<bool>> = (0..runs).into_par_iter().map(alarm).collect();
     let Some(alarms) = alarms else { return Finding::broken("a radiance was not finite".to_owned()) };
@@ -120,7 +122,7 @@ pub fn power_of_tiles(context: &Context) -> Finding {
                     by_place(&(0..REPLICATES).map(|_| image(&mut draws)).collect::<Vec<_>>())
                 };
                 let (ours, theirs) = (side(bias), side(0.0));
-                is_found(&compare(&tiling, &ours, &Truth::Replicates(&theirs), 0.0, LEVEL))
+                is_found(&compare(&tiling, &ours, &Truth::Replicates(&theirs), RULES))
             })
             .count() as u64;
         let place = if everywhere { "everywhere" } else { "in one tile" };

@@ -31,7 +31,7 @@ use super::{Finding, Kind, Result, Settings};
 
 use decoupled::Decoupled;
 use numbers::Pair;
-use tiles::{Comparison, Series, Tiling, Truth, by_place, compare};
+use tiles::{Comparison, Rules, Series, Tiling, Truth, by_place, compare};
 
 /// Columns of an image where no size is asked for.
 const COLUMNS: u32 = 48;
@@ -237,13 +237,29 @@ impl Question {
             Some(exact) => {
                 let exact = tiling.means(exact);
                 let allowance = EXACT_ALLOWANCE * exact.last().copied().unwrap_or(0.0);
-                compare(&tiling, &images.ours, &Truth::Exact(&exact), allowance, level)
+                let unseen = self.unseen(&tiling, images, exact.iter().copied(), level);
+                compare(&tiling, &images.ours, &Truth::Exact(&exact), Rules { allowance, unseen, level })
             }
             None => {
                 let allowance = ROUNDING * mean_of_last(&images.theirs);
-                compare(&tiling, &images.ours, &Truth::Replicates(&images.theirs), allowance, level)
+                let means = images.theirs.iter().map(|tile| tile.iter().sum::<f64>() / tile.len() as f64);
+                let unseen = self.unseen(&tiling, images, means, level);
+                compare(&tiling, &images.ours, &Truth::Replicates(&images.theirs), Rules { allowance, unseen, level })
             }
         }
+    }
+
+    /// What may have been missed in a tile whose replicates all agree. None of its N samples met an event, so the event's
+    /// probability is below ln(1/level)/N but for a chance of `level`; it is taken to be no brighter than ten times the
+    /// brightest tile. 0 where nothing is random.
+    fn unseen(&self, tiling: &Tiling, images: &Images, means: impl Iterator<Item = f64>, level: f64) -> f64 {
+        if !self.set.is_random(&self.scene.layout) {
+            return 0.0;
+        }
+        let [columns, rows] = tiling.shape();
+        let pixels = self.size.pixels() as f64 / f64::from(columns * rows);
+        let samples = images.ours[0].len() as f64 * f64::from(self.taken) * pixels;
+        10.0 * means.fold(0.0, f64::max) * -libm::log(level) / samples
     }
 }
 
@@ -350,7 +366,8 @@ fn apart(
         .collect();
     let nothing = vec![0.0; differences.len()];
     let allowance = ROUNDING * mean_of_last(&images.ours).abs();
-    Ok(compare(&tiling, &differences, &Truth::Exact(&nothing), allowance, level))
+    // Pairs that all agree are no evidence, whatever they may have missed.
+    Ok(compare(&tiling, &differences, &Truth::Exact(&nothing), Rules { allowance, unseen: 0.0, level }))
 }
 
 fn coupling(question: &Question, settings: &Settings, level: f64) -> Finding {

@@ -20,6 +20,9 @@ enum Ticket {
     Two(Dim2),
 }
 
+/// By replicate and function: q, and the correlation within the set.
+type Products = Vec<[[f64; 2]; 2]>;
+
 /// Two decisions whose numbers were looked at together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pair {
@@ -47,7 +50,7 @@ pub fn pairs(set: SamplerSet, layout: &SampleLayout, spp: u32, seed: u64, replic
             (claim.decision, ticket)
         })
         .collect();
-    let mut together: Vec<([usize; 2], Vec<[[f64; 2]; 2]>)> = Vec::new();
+    let mut together: Vec<([usize; 2], Products)> = Vec::new();
     let mut owners: Vec<Decision> = Vec::new();
     let mut n = 1;
     for replicate in 0..replicates {
