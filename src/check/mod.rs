@@ -166,7 +166,7 @@ impl Result {
 
 /// A probability in two digits.
 fn short(p: f64) -> String {
-    if p >= 0.001 { format!("{p:.2}") } else { format!("{p:.0e}") }
+    if p >= 0.01 { format!("{p:.2}") } else { format!("{p:.0e}") }
 }
 
 /// A share in two digits.
