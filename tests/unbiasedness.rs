@@ -245,7 +245,7 @@ fn random_scenes_have_the_radiance_of_their_closed_form() {
     // A statistical failure does not get simpler by shrinking: the first one found is shown.
     let config = Config { cases: CASES, failure_persistence: None, max_shrink_iters: 0, ..Config::default() };
     let mut runner = TestRunner::new_with_rng(config, TestRng::from_seed(RngAlgorithm::ChaCha, &[29; 32]));
-    let family = Family { tests: CASES, false_alarm: 1e-7 };
+    let family = Family { tests: u64::from(CASES), false_alarm: 1e-7 };
     let caught: RefCell<Vec<f64>> = RefCell::default();
     let dark = RefCell::new(0);
     runner
