@@ -8,8 +8,8 @@ use crate::stats::hypothesis::{
 };
 use crate::stats::image_error::mse_unbiased;
 use crate::stats::{
-    Bootstrap, Family, Moments, Pairing, Tails, Trial, binomial_test, equivalence_test, fisher_test, rmse_ratio,
-    student_t_quantile, t_interval, t_test, welch_test,
+    Bootstrap, Decision, Family, Moments, Pairing, Tails, Trial, binomial_test, equivalence_test, fisher_test,
+    rmse_ratio, student_t_quantile, t_interval, t_test, welch_test,
 };
 
 /// The checks of this group.
@@ -28,7 +28,11 @@ pub fn checks() -> Vec<Check> {
         dice("chi2-density", "draws of a density pass χ² and KS, a bent one does not, strata are too even", density),
         dice("equivalence-rate", "at the margin itself equivalence is claimed at the stated rate", equivalence_rate),
         dice("bootstrap-ratio", "BCa intervals of an RMSE ratio hold the truth about 95 times in 100", ratio_coverage),
-        dice("heavy-tails", "replicates with infinite variance are flagged, never called biased", heavy_tails),
+        dice(
+            "heavy-tails",
+            "replicates with infinite variance are flagged as heavy-tailed, not called biased",
+            heavy_tails,
+        ),
     ]
 }
 
@@ -153,9 +157,9 @@ fn count_tests(_: &Context) -> Finding {
     tally.saying("15 binomial and 8 hypergeometric p-values agree with sums of whole numbers to 1e-11")
 }
 
-/// 20 000 tests at 1 % on normal replicates, for which Student's t is exact.
+/// 8 000 tests at 1 % on normal replicates, for which Student's t is exact.
 fn t_test_rate(context: &Context) -> Finding {
-    let runs = u64::from(context.replicates(20_000, 2_000));
+    let runs = u64::from(context.replicates(8_000, 2_000));
     let mut draws = Draws::new(context, 0);
     let level = Family::one(0.01);
     let alarms = (0..runs).filter(|_| !t_test(&draws.normals(8), 0.0, level).holds()).count() as u64;
@@ -168,7 +172,7 @@ fn t_test_rate(context: &Context) -> Finding {
 /// The bias named by the verdict at the *true* spread: caught at POWER = 0.99, for 64 replicates to within what the estimated
 /// spread costs (about 0.2 %).
 fn t_test_power(context: &Context) -> Finding {
-    let runs = u64::from(context.replicates(5_000, 1_000));
+    let runs = u64::from(context.replicates(2_500, 1_000));
     let level = Family::one(1e-4);
     let mut draws = Draws::new(context, 0);
     // A set of mean 0 and variance 1 exactly says what the test detects at that spread.
@@ -197,7 +201,7 @@ fn t_test_power(context: &Context) -> Finding {
 
 /// Three replicates: Student's factor 4.30 covers 95 %, the normal factor 1.96 only 81 %.
 fn coverage(context: &Context) -> Finding {
-    let runs = u64::from(context.replicates(20_000, 2_000));
+    let runs = u64::from(context.replicates(8_000, 2_000));
     let mut draws = Draws::new(context, 0);
     let normal = student_t_quantile(0.975, f64::INFINITY);
     let (mut student, mut short) = (0, 0);
@@ -225,7 +229,8 @@ fn coverage(context: &Context) -> Finding {
 
 /// The density 4xy on the unit square, drawn as (√u, √v).
 fn density(context: &Context) -> Finding {
-    let n = u64::from(context.replicates(20_000, 4_000));
+    // Fewer could not tell u^0.45 from √u in 256 cells; they take hundredths of a second.
+    let n = u64::from(context.replicates(20_000, 20_000));
     let family = context.family(3);
     let masses = cell_masses(|[x, y]| 4.0 * x * y, [0.0; 2], [1.0; 2], [16, 16]);
     let mut draws = Draws::new(context, 0);
@@ -254,7 +259,7 @@ fn density(context: &Context) -> Finding {
 /// Truth at the edge of the margin: 5 % are claimed equivalent. Normal replicates, so the rate is exact for the mean; the ratio
 /// (Fieller) too; the variance of normal numbers within 2 % of its own (skewed) squares.
 fn equivalence_rate(context: &Context) -> Finding {
-    let runs = u64::from(context.replicates(4_000, 1_000));
+    let runs = u64::from(context.replicates(2_000, 1_000));
     let level = Family::one(0.05);
     let family = context.family(3);
     let mut draws = Draws::new(context, 0);
@@ -316,19 +321,39 @@ fn heavy_tails(context: &Context) -> Finding {
     let runs = context.replicates(300, 100);
     let family = Family::one(1e-3);
     let mut tally = Tally::new();
-    let (mut wrong, mut flagged) = (0, 0);
+    let (mut wrong, mut flagged, mut accused) = (0, 0, 0);
     for run in 0..u64::from(runs) {
         let trial = Trial::new(200, family).seeded(context.seed_of(0, run));
         let value = |seed: u64| 0.3 / libm::pow(((seed >> 11) as f64 + 0.5) * 0.5f64.powi(53), 0.7);
         let agreement = trial.of(value).against(1.0);
         wrong += u32::from(!agreement.holds());
+        accused += u32::from(agreement.decision() == Decision::Fails);
         flagged += u32::from(agreement.tails.is_some_and(|t| t.are_heavy()));
     }
-    tally.fact(format!("{flagged} of {runs} sets are flagged as heavy-tailed"), flagged == runs);
+    // A set that drew no large value looks harmless: a share of such is allowed, far above what was ever seen.
+    tally.fact(format!("{flagged} of {runs} sets are flagged as heavy-tailed"), 20 * flagged >= 19 * runs);
+    tally.fact(format!("{accused} of {runs} are called biased for sure"), 50 * accused <= runs);
     tally.fact(format!("Student's t alone fails {wrong} of {runs} at a stated 0.1 %"), wrong > runs / 50);
     let mut draws = Draws::new(context, 1);
     let normal = (0..runs).filter(|_| Tails::of(&draws.normals(200)).is_some_and(|t| t.are_heavy())).count();
     // At most HEAVY_TAIL_LEVEL = 1e-4 each; five of 300 by chance: 2e-10.
     tally.fact(format!("{normal} of {runs} normal sets are flagged"), normal < 5);
     tally.saying(format!("{flagged} of {runs} heavy sets flagged, {normal} normal ones; t alone would fail {wrong}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::check::{Settings, run};
+
+    /// With a quarter of the replicates; the failures' own test file runs theirs.
+    #[test]
+    fn every_check_of_the_group_passes() {
+        let settings = Settings { effort: 0.25, ..Settings::default() };
+        for check in checks() {
+            let found = run(&check, &settings).finding;
+            println!("{}: {}", check.name, found.says);
+            assert!(found.passed, "{}: {}", check.name, found.says);
+        }
+    }
 }
