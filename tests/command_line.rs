@@ -786,8 +786,12 @@ fn what_config_show_prints_loads_to_the_same_picture() {
 #[test]
 fn explain_tells_what_each_decision_reads() {
     let text = run_in(Path::new("."), &["explain", "sobol", "--scene", &repository("configs/a01.json")]).fine();
-    for part in ["sobol = sobol:joint:owen@each", "pixel 0–1, lens 2–3, light point 4–5", "light pick   not decided"]
-    {
+    for part in [
+        "sobol = sobol:joint:owen@each",
+        "Domain: 1 to 16777216 samples, indices from 0 to one below the count; a net at powers of two",
+        "pixel 0–1, lens 2–3, light point 4–5",
+        "light pick   not decided",
+    ] {
         assert!(text.contains(part), "{part:?} is missing in: {text}");
     }
     let text = run_in(Path::new("."), &["explain", "stratified:sheet"]).fine();

@@ -13,7 +13,7 @@ use sampler_lab::experiment::results::{
     EnsembleRow, Growth, Kind, ReferenceRow, Row, Timing, read, read_about, read_timings, timings_path,
 };
 use sampler_lab::experiment::spec::Experiment;
-use sampler_lab::report::{Figures, Summary, summarise, text, write};
+use sampler_lab::report::{Figures, Measurements, Summary, summarise, text, text_with, write};
 use sampler_lab::stats::Estimate;
 
 fn stored() -> PathBuf {
@@ -142,21 +142,22 @@ fn a_wrong_limit_a_stall_and_a_falling_error_have_words_of_their_own() {
         row.variance = Some(estimate(1e-2 / f64::from(row.spp.asked), 1e-5));
     });
     assert!(wrong.contains("**`ld:sheet` converges to a wrong image in `a01`**"), "{wrong}");
-    assert!(wrong.contains("| `ld:sheet` | no (0.0100 "));
+    assert!(wrong.contains("| `ld:sheet` | no: converges to a wrong image, "));
     let both = edited(ld, |row| {
         set(row, 1.2e-2, biased);
         row.variance = Some(estimate(2e-3, 1e-5));
     });
     assert!(both.contains("**`ld:sheet` stalls in `a01`, and is biased**"), "{both}");
-    assert!(both.contains("| `ld:sheet` | no: it stalls, and is biased (0.0100 "));
+    assert!(both.contains("| `ld:sheet` | no: stalls, and is biased, "));
     let stalled = edited(ld, |row| set(row, 1.2e-2, estimate(1e-5, 1e-4)));
     assert!(stalled.contains("**`ld:sheet` stalls in `a01`**"), "{stalled}");
-    assert!(stalled.contains("| `ld:sheet` | no bias seen, but it stalls ("));
+    assert!(stalled.contains("| `ld:sheet` | no: stalls, no bias seen, "));
     let falling = edited(ld, |row| set(row, 1e-1 / f64::from(row.spp.asked), estimate(1e-6, 1e-5)));
     assert!(falling.contains("| `a01` | `ld:sheet` | error falls, no bias seen | 0.250 "), "{falling}");
-    assert!(falling.contains(
-        "| `ld:sheet` | no bias seen up to 64 spp, at most 0.70 % of the MSE; not promised: decisions in step ("
-    ));
+    assert!(
+        falling.contains("| `ld:sheet` | none seen: at most 0.70 % of the MSE; not promised: decisions in step"),
+        "{falling}"
+    );
     for (report, right) in [(&wrong, 0), (&stalled, 1), (&falling, 2)] {
         let found = ["`ld:sheet` converges to", "`ld:sheet` stalls", "`ld:sheet` | error falls"];
         let found: Vec<usize> = (0..3).filter(|&i| report.contains(found[i])).collect();
@@ -174,7 +175,7 @@ fn an_interval_that_holds_both_answers_says_cannot_tell() {
         },
     );
     assert!(report.contains("| `a01` | `ld:sheet` | cannot tell | "), "{report}");
-    assert!(report.contains("| `ld:sheet` | cannot tell ("));
+    assert!(report.contains("| `ld:sheet` | cannot tell: "));
 }
 
 #[test]
@@ -213,9 +214,10 @@ fn missing_rows_are_counted_and_what_is_there_is_still_told() {
     let (report, missing) = without(&|_| true);
     assert_eq!(missing.len(), 3, "{missing:?}");
     assert!(report.contains("There are no comparisons yet to answer from."));
+    let measured = Measurements::of(&summary(&all));
     for drop in 0..all.len() {
         let rows: Vec<Row> = all.iter().enumerate().filter(|(i, _)| *i != drop).map(|(_, row)| row.clone()).collect();
-        assert!(!text(&summary(&rows), &Figures::default()).contains("NaN"));
+        assert!(!text_with(&summary(&rows), &Figures::default(), &measured).contains("NaN"));
     }
 }
 
@@ -259,7 +261,9 @@ fn neighbours_that_err_alike_are_told_from_those_that_do_not() {
     let rho = |value: f64| Some(Estimate::without_interval(value));
     let alike = edited(fixed, |row| row.error_autocorrelation = rho(0.9));
     assert!(
-        alike.contains("**Neighbours err more alike** under `halton:sheet` in `a01` (ρ = +0.90 (no interval))"),
+        alike.contains(
+            "**Neighbours err more alike** under `halton:sheet` in `a01` (ρ = +0.90 (no interval), p < 0.001)"
+        ),
         "{alike}"
     );
     assert!(alike.contains("| structure instead of noise | `halton:sheet` | `a01` |"));
@@ -292,11 +296,85 @@ fn equal_pixels_are_called_identical() {
     );
 }
 
+/// The report where the mean of `ld:sheet` at 64 spp is off by `off` of the mean radiance, its replicates `spread` apart.
+fn with_mean_off(off: f64, spread: f64) -> String {
+    let mut rows = rows();
+    let truth = rows.iter().find_map(|row| if let Row::Reference(row) = row { Some(row.mean) } else { None }).unwrap();
+    let mut replicate = 0;
+    for row in &mut rows {
+        match row {
+            Row::Image(row) if row.sampler == "ld:sheet" && row.spp.asked == 64 => {
+                row.mean = truth * (1.0 + off + if replicate % 2 == 0 { spread } else { -spread });
+                replicate += 1;
+            }
+            Row::Ensemble(row) if row.sampler == "ld:sheet" && row.spp.asked == 64 => {
+                row.bias = estimate(off * truth, spread * truth);
+            }
+            _ => {}
+        }
+    }
+    assert!(replicate > 1);
+    text(&summary(&rows), &Figures::default())
+}
+
+/// Equivalence: a margin of 1 %, and three words for what the test says.
+#[test]
+fn a_mean_is_shown_the_same_shown_different_or_neither() {
+    let word = |report: &str| {
+        let (_, table) = report.split_once("Error of the mean at 64 spp").unwrap();
+        let line = table.lines().find(|line| line.starts_with("| `a01` | `ld:sheet` |")).unwrap().to_owned();
+        ["shown the same", "shown different", "cannot tell"]
+            .into_iter()
+            .filter(|word| line.contains(word))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(word(&with_mean_off(0.0, 2e-4)), ["shown the same"]);
+    assert_eq!(word(&with_mean_off(0.3, 2e-4)), ["shown different"]);
+    assert_eq!(word(&with_mean_off(0.01, 5e-3)), ["cannot tell"]);
+    let off = with_mean_off(0.3, 2e-4);
+    assert!(off.contains("the largest error is that of `ld:sheet`, +30"), "{off}");
+    assert!(off.contains("; shown different: `ld:sheet` ("), "{off}");
+}
+
+/// The lines of the answer box.
+fn answers(report: &str) -> Vec<&str> {
+    let (_, after) = report.split_once("## Answers").unwrap();
+    let (answers, _) = after.split_once("**Contents**").unwrap();
+    answers.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit())).collect()
+}
+
+#[test]
+fn every_answer_leads_to_a_number_an_interval_or_a_test_and_its_table() {
+    let report = text(&summary(&rows()), &Figures::default());
+    let lines = answers(&report);
+    assert!((4..=8).contains(&lines.len()), "{lines:?}");
+    for line in lines {
+        let has_interval = line.contains(" [") && line.contains("], ") || line.contains("] ") || line.contains("])");
+        assert!(has_interval || line.contains("p = ") || line.contains("p < "), "{line}");
+        assert!(line.contains("](#table-"), "{line}");
+    }
+}
+
+#[test]
+fn every_cell_of_the_table_of_predicates_answers_and_holds_its_number() {
+    let page = text(&summary(&rows()), &Figures::default());
+    let (_, after) = page.split_once("## Advantages and disadvantages").unwrap();
+    let (section, _) = after.split_once("## Limits").unwrap();
+    let lines: Vec<&str> = section.lines().filter(|line| line.starts_with("| `")).collect();
+    assert_eq!(lines.len(), 4 * 5, "four tables of five samplers: {lines:?}");
+    for cell in lines.iter().flat_map(|line| line.trim_matches(['|', ' ']).split(" | ").skip(1)) {
+        let answers = ["yes", "no", "cannot tell", "none seen", "1 (itself)", "–"];
+        assert!(answers.iter().any(|answer| cell.starts_with(answer)), "{cell}");
+        let is_told = cell.contains(|c: char| c.is_ascii_digit()) || cell.contains("nothing random") || cell == "–";
+        assert!(is_told, "{cell}");
+    }
+}
+
 #[test]
 fn one_replicate_of_a_random_sampler_has_no_interval_and_no_verdict() {
     // The row's interval holds the reference's noise alone: it must not pass for the sampler's.
     let report = edited(|sampler, _| sampler == "ld:sheet", |row| row.replicates = 1);
-    assert!(report.contains("| `ld:sheet` | cannot tell ("), "{report}");
+    assert!(report.contains("| `ld:sheet` | cannot tell: "), "{report}");
     let line = report.lines().find(|line| line.starts_with("| `a01` | `ld:sheet` |")).unwrap();
     assert!(line.contains("(no interval)"), "{line}");
 }

@@ -3,36 +3,39 @@
 //!
 //! A replicate is the mean of f over one whole randomised set. Its squared errors are averaged over seeds and compared with
 //! the exact variance by a t test on those squares, whose own spread carries their kurtosis. Seeds are fixed. The file's
-//! tests share one family: at most 340 tests with a nominal rate of 2e-8. Means of thousands of squares lean a little to the
-//! lower side (skewness 2.8/√20 000 = 0.02, a factor e^(0.02 z³/6) ≈ 3 at this level), so the family's
-//! false-alarm rate is below 1e-7.
+//! tests share one family: at most 340 tests with a nominal rate of 5e-10. Studentised means of squares fall low too often
+//! (skewness γ = 2.8: a factor exp(γ z³/(3√R)) = 6 at z = 6.9 and R = 20 000, 100 at R = 4000), so the family's
+//! false-alarm rate is below 5e-8. Rows of the reference that have an exact value (20 variances, 20 of E[L2*²]) are held to its own
+//! tolerance besides, |z| < 5.8: 7e-9 each, 3e-7 together, for seeds that were not these.
 
-use std::f64::consts::FRAC_1_PI;
-
-use sampler_lab::sampling::hash::bits64;
+use sampler_lab::check::samplers::laws::{AxisLaw, set_errors};
+use sampler_lab::check::samplers::reading::Integrand;
+use sampler_lab::check::samplers::scrambles::{burley_2020, owen_tree, plain_pair};
+use sampler_lab::check::samplers::slopes::{COUNTS, INTEGRANDS as OF_SLOPES, TOLERANCE, slopes};
+use sampler_lab::sampling::hash::{bits64, derive};
 use sampler_lab::sampling::{Preset, SamplerSpec, point_set};
 use sampler_lab::stats::discrepancy::{L2Kind, Points, l2_squared};
 use sampler_lab::stats::{Family, Verdict, t_test, z_test};
 use serde_json::Value;
 
-const FAMILY: Family = Family { tests: 340, false_alarm: 2e-8 };
+const FAMILY: Family = Family { tests: 340, false_alarm: 5e-10 };
 
 type Set = Vec<[f64; 2]>;
-type Integrand = (&'static str, fn(f64, f64) -> f64, f64);
 
-/// The integrands of `sampler_convergence.json` and two coordinates, with their integrals.
-const INTEGRANDS: [Integrand; 7] = [
-    ("disk", |x, y| f64::from(x * x + y * y < 2.0 * FRAC_1_PI), 0.5),
-    ("triangle", |x, y| f64::from(y > x), 0.5),
-    ("step", |x, _| f64::from(x < FRAC_1_PI), FRAC_1_PI),
-    ("bilinear", |x, y| x * y, 0.25),
-    ("gaussian", |x, y| libm::exp(-x * x - y * y), 0.557_746_285_351_033_6),
-    ("x", |x, _| x, 0.5),
-    ("y", |_, y| y, 0.5),
+/// The integrands of `sampler_convergence.json` and two coordinates.
+const INTEGRANDS: [(&str, Integrand); 7] = [
+    ("disk", Integrand::Disk),
+    ("triangle", Integrand::Diagonal),
+    ("step", Integrand::Step),
+    ("bilinear", Integrand::Product),
+    ("gaussian", Integrand::Gaussian),
+    ("x", Integrand::X),
+    ("y", Integrand::Y),
 ];
 
 fn integrand(name: &str) -> Integrand {
-    INTEGRANDS.into_iter().find(|i| i.0 == name).unwrap_or_else(|| panic!("an integrand, not {name}"))
+    let found = INTEGRANDS.into_iter().find(|i| i.0 == name);
+    found.unwrap_or_else(|| panic!("an integrand, not {name}")).1
 }
 
 fn spec(text: &str) -> SamplerSpec {
@@ -51,9 +54,8 @@ fn errors(names: &[&str], seeds: u64, set: &dyn Fn(u64) -> Set) -> Vec<Vec<f64>>
     let mut errors = vec![Vec::with_capacity(seeds as usize); names.len()];
     for seed in 0..seeds {
         let points = set(seed);
-        for (errors, (_, f, integral)) in errors.iter_mut().zip(&integrands) {
-            let mean = points.iter().map(|&[x, y]| f(x, y)).sum::<f64>() / points.len() as f64;
-            errors.push(mean - integral);
+        for (errors, integrand) in errors.iter_mut().zip(&integrands) {
+            errors.push(integrand.error(points.iter().copied()));
         }
     }
     errors
@@ -61,6 +63,11 @@ fn errors(names: &[&str], seeds: u64, set: &dyn Fn(u64) -> Set) -> Vec<Vec<f64>>
 
 fn squares(errors: &[f64]) -> Vec<f64> {
     errors.iter().map(|e| e * e).collect()
+}
+
+/// The tolerance of the reference's README, at our own count of replicates.
+fn assert_within_the_references_tolerance(what: &str, verdict: &Verdict) {
+    assert!(verdict.holds() && verdict.statistic.is_none_or(|z| z.abs() < 5.8), "{what}: {verdict}");
 }
 
 /// Is the mean unbiased and its variance the exact one?
@@ -113,12 +120,50 @@ fn every_sampler_has_the_variance_of_the_reference() {
                     assert_same_as_simulated(&what, errors, number(&row["mse"]), number(&row["mse_std_error"]));
                 } else {
                     assert_exact(&what, errors, number(&row["exact_variance"]));
+                    let verdict = t_test(&squares(errors), number(&row["exact_variance"]), FAMILY);
+                    assert_within_the_references_tolerance(&what, &verdict);
                     exact += 1;
                 }
             }
         }
     }
     assert_eq!(exact, 20, "exact variances in the file");
+}
+
+/// All slopes of the file for the samplers that we have, ± 0.05 as its README asks, and the RMSE at n = 1024 within 15 % (theirs has
+/// an error of 2 to 3 %, ours of 1.3 %). With 3000 replicates 0.05 is more than 8 standard errors of the difference: see
+/// `check::samplers::slopes`, which also says what is exact in place of simulated.
+#[test]
+fn every_slope_of_the_reference_is_met() {
+    let file = reference();
+    let rows = file["slopes"].as_array().unwrap();
+    let mut tried = 0;
+    for name in ["random", "jittered", "owen_02", "xor_02", "halton_cp", "hammersley_cp"] {
+        let (found, rmse) = slopes(spec(ours(name).unwrap()), 3000, |n, r| derive(7, &[u64::from(n), r]));
+        let at_1024 = rmse[COUNTS.iter().position(|&n| n == 1024).unwrap()];
+        for row in rows.iter().filter(|r| r["sampler"] == name) {
+            let of = integrand(row["integrand"].as_str().unwrap());
+            let k = OF_SLOPES.iter().position(|&i| i == of).unwrap();
+            let (slope, value) = (number(&row["rmse_slope_n16_to_4096"]), number(&row["rmse_at_1024"]));
+            assert!((found[k] - slope).abs() < TOLERANCE, "{name}, {of:?}: slope {} for {slope}", found[k]);
+            assert!((at_1024[k] / value - 1.0).abs() < 0.15, "{name}, {of:?}: RMSE {} for {value}", at_1024[k]);
+            tried += 1;
+        }
+    }
+    assert_eq!(tried, 30);
+}
+
+/// E[L2*²] as the file has it, by the pair laws that the checks use.
+#[test]
+fn every_expected_l2_star_of_the_reference_is_met() {
+    let file = reference();
+    for row in file["expected_L2star"].as_array().unwrap() {
+        let sampler = ours(row["sampler"].as_str().unwrap()).unwrap();
+        let n = row["n"].as_u64().unwrap() as u32;
+        let [x, y] = [0, 1].map(|axis| AxisLaw::of(spec(sampler), 0, axis, n, false));
+        let (found, exact) = (set_errors(&x, &y).l2_star, number(&row["value"]));
+        assert!((found / exact - 1.0).abs() < 1e-11, "{sampler}, n = {n}: {found} for {exact}");
+    }
 }
 
 /// Both mean squares are estimates: their difference has the root of both squared standard errors.
@@ -183,7 +228,7 @@ fn the_mean_squared_l2_star_discrepancy_is_exact() {
             let set = sets(sampler, n);
             let values: Vec<f64> = (0..seeds).map(|seed| l2_star_squared(&set(seed))).collect();
             let verdict = t_test(&values, exact, FAMILY);
-            assert!(verdict.holds(), "{sampler}, n = {n}: {verdict}");
+            assert_within_the_references_tolerance(&format!("{sampler}, n = {n}"), &verdict);
         }
     }
 }
@@ -192,84 +237,19 @@ fn l2_star_squared(points: &Set) -> f64 {
     l2_squared(&Points::new_2d(points).unwrap(), L2Kind::Star).unwrap()
 }
 
-/// E[(x − ½)(x' − ½)] of two points under a nested uniform scramble in base b that share their first k digits and differ in
-/// the next: (1 − b⁻²ᵏ − (b + 1) b⁻²ᵏ⁻²)/12; 1/12 for the point itself.
-///
-/// A digit has variance (b² − 1)/12: the shared ones add (b² − 1)/12 · b⁻²ʲ each; two different digits in one place
-/// have covariance −(b² − 1)/12/(b − 1); later digits are independent.
-fn scrambled_covariance(base: f64, shared: Option<u32>) -> f64 {
-    let Some(k) = shared else { return 1.0 / 12.0 };
-    let tail = base.powi(-2 * k as i32);
-    (1.0 - tail - (base + 1.0) * tail / (base * base)) / 12.0
-}
-
-/// Exact variances of the means of x, y and xy from the digits that pairs share: x and y are scrambled independently, so
-/// Var(xy) = n⁻² Σ C_x C_y + ¼ Var(x) + ¼ Var(y).
-fn pair_variances(n: u32, shared: impl Fn(u32, u32) -> [Option<u32>; 2], bases: [f64; 2]) -> [f64; 3] {
-    let mut sums = [0.0; 3];
-    for i in 0..n {
-        for j in 0..n {
-            let shared = shared(i, j);
-            let [cx, cy] = [0, 1].map(|a| scrambled_covariance(bases[a], shared[a]));
-            for (sum, term) in sums.iter_mut().zip([cx, cy, cx * cy]) {
-                *sum += term;
-            }
-        }
-    }
-    let [x, y, product] = sums.map(|s| s / f64::from(n).powi(2));
-    [x, y, product + 0.25 * x + 0.25 * y]
-}
-
-/// Number of times that `base` divides the difference: the digits of φ_b that i and j share.
-fn shared_halton(base: u32, i: u32, j: u32) -> Option<u32> {
-    let mut rest = i.abs_diff(j);
-    if rest == 0 {
-        return None;
-    }
-    let mut count = 0;
-    while rest.is_multiple_of(base) {
-        rest /= base;
-        count += 1;
-    }
-    Some(count)
-}
-
-/// The unscrambled pair as 32-bit fractions.
-fn plain_fractions(n: u32) -> Vec<[u32; 2]> {
-    let points = point_set(spec("ld:plain"), n, 0).unwrap();
-    points.into_iter().map(|p| p.map(|u| (u * 4_294_967_296.0) as u32)).collect()
-}
-
-fn owen_pair_variances(n: u32) -> [f64; 3] {
-    let plain = plain_fractions(n);
-    let shared = |i: u32, j: u32| {
-        let (p, q) = (plain[i as usize], plain[j as usize]);
-        [0, 1].map(|a| (p[a] != q[a]).then(|| (p[a] ^ q[a]).leading_zeros()))
-    };
-    pair_variances(n, shared, [2.0, 2.0])
-}
-
-#[test]
-fn pair_covariances_give_the_closed_forms_of_nets() {
-    for m in 0..9 {
-        let n = 1u32 << m;
-        let n3 = f64::from(n).powi(3);
-        let [x, y, xy] = owen_pair_variances(n);
-        let exact = [1.0 / 12.0 / n3, 1.0 / 12.0 / n3, 7.0 * (4.0 + 3.0 * f64::from(m)) / 576.0 / n3];
-        for (found, exact) in [x, y, xy].into_iter().zip(exact) {
-            // n² terms of up to 1/12 cancel, each rounded.
-            assert!((found - exact).abs() < f64::from(n) * f64::EPSILON, "n = {n}: {found:e} {exact:e}");
-        }
-    }
+/// Exact mean squares of x, y and xy of a sampler's set.
+fn exact_errors(sampler: &str, n: u32) -> [f64; 3] {
+    let [x, y] = [0, 1].map(|axis| AxisLaw::of(spec(sampler), 0, axis, n, false));
+    let exact = set_errors(&x, &y);
+    [exact.x, exact.y, exact.product].map(|e| e.mean_square)
 }
 
 /// Owen scrambles of counts that are no powers of two, where only the pair sum is exact.
 #[test]
 fn owen_scrambles_of_odd_counts_have_their_exact_variance() {
     for n in [3u32, 12, 24, 48, 100] {
-        let [x, y, xy] = owen_pair_variances(n);
         let errors = errors(&["x", "y", "bilinear"], 10_000, &sets("ld:step:owen", n));
-        for (errors, exact) in errors.iter().zip([x, y, xy]) {
+        for (errors, exact) in errors.iter().zip(exact_errors("ld:step:owen", n)) {
             assert_exact(&format!("ld:step:owen, n = {n}"), errors, exact);
         }
     }
@@ -278,48 +258,22 @@ fn owen_scrambles_of_odd_counts_have_their_exact_variance() {
 #[test]
 fn digit_scrambled_halton_has_its_exact_variance() {
     for n in [6u32, 16, 27, 36, 100] {
-        let shared = |i, j| [shared_halton(2, i, j), shared_halton(3, i, j)];
-        let [x, y, xy] = pair_variances(n, shared, [2.0, 3.0]);
         let errors = errors(&["x", "y", "bilinear"], 10_000, &sets("halton:step:digits", n));
-        for (errors, exact) in errors.iter().zip([x, y, xy]) {
+        for (errors, exact) in errors.iter().zip(exact_errors("halton:step:digits", n)) {
             assert_exact(&format!("halton:step:digits, n = {n}"), errors, exact);
         }
     }
     // n = bᵐ: one independent uniform point in each of n strata, 1/(12 n³).
     for (axis, base, n) in [(0, 2u32, 64u32), (1, 3, 27), (1, 3, 81)] {
-        let shared = |i, j| [shared_halton(base, i, j); 2];
-        let pairs = pair_variances(n, shared, [f64::from(base); 2])[0];
         let exact = 1.0 / 12.0 / f64::from(n).powi(3);
-        assert!((pairs - exact).abs() < f64::from(n) * f64::EPSILON, "base {base}, n = {n}");
         let errors = errors(&["x", "y"], 10_000, &sets("halton:step:digits", n));
         assert_exact(&format!("halton:step:digits, base {base}, n = {n}"), &errors[axis], exact);
     }
 }
 
-/// Nested uniform scramble by its definition: each digit is flipped by a coin of its own for every prefix above it.
-fn owen_tree(fraction: u32, key: u64) -> u32 {
-    (0..32).fold(0, |out, level| {
-        // A one before the prefix tells prefixes of different lengths apart.
-        let prefix = (1u64 << level) | (u64::from(fraction) >> (32 - level));
-        let coin = (bits64(key, prefix) >> 63) as u32;
-        out | ((((fraction >> (31 - level)) & 1) ^ coin) << (31 - level))
-    })
-}
-
-/// Burley's hash of 2020 (JCGT 9(4)), with its first constants.
-fn burley_2020(fraction: u32, seed: u32) -> u32 {
-    let mut x = fraction.reverse_bits();
-    x = x.wrapping_add(seed);
-    x ^= x.wrapping_mul(0x6c50_b47c);
-    x ^= x.wrapping_mul(0xb82f_1e52);
-    x ^= x.wrapping_mul(0xc7af_e638);
-    x ^= x.wrapping_mul(0x8d22_f6e6);
-    x.reverse_bits()
-}
-
 /// The plain pair under a scramble of each axis with a key of its own.
 fn scrambled(n: u32, scramble: impl Fn(u32, u64) -> u32) -> impl Fn(u64) -> Set {
-    let plain = plain_fractions(n);
+    let plain = plain_pair(n);
     move |seed| {
         let keys = [bits64(seed, 1), bits64(seed, 2)];
         let axis = |p: &[u32; 2], a: usize| f64::from(scramble(p[a], keys[a])) / 4_294_967_296.0;

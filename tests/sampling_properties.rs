@@ -1,14 +1,12 @@
-//! What every sampler promises, over the whole vocabulary: ranges, nets, strata, orders, uniformity, and which
-//! decisions march in step.
+//! What every sampler promises, over the whole vocabulary: nets, strata, orders, and which decisions march in step.
 //!
+//! Ranges, blocks of sequences, marginals and decoupled decisions are checks of the group `samplers` (`tests/sampler_certificates.rs`).
 //! Seeds are fixed, so each test always passes or always fails. Each statistical test states its family's false-alarm rate.
 
 use sampler_lab::sampling::{
     Decision, Dim1, Dim2, Order, PixelKey, PointSource, Points, Preset, Random, SampleLayout, Sampler, SamplerSpec,
     every_legal_spec, point_set,
 };
-use sampler_lab::stats::discrepancy::{Points as PointSet, t_value};
-use sampler_lab::stats::hypothesis::ks_uniform_test;
 use sampler_lab::stats::{Family, t_test};
 
 /// The four decisions of a scene that needs them all.
@@ -44,35 +42,6 @@ fn span(sampler: &Sampler, pixel: PixelKey, dim: &Dim2) -> Vec<[f32; 2]> {
     let (mut x, mut y) = (vec![0.0; n], vec![0.0; n]);
     sampler.fill_2d(pixel, 0, dim, &mut x, &mut y);
     x.into_iter().zip(y).map(|(x, y)| [x, y]).collect()
-}
-
-#[test]
-fn the_last_index_of_the_largest_count_stays_below_one_in_every_decision() {
-    let t = tickets();
-    let n = 1 << 24;
-    for s in numbered_specs() {
-        let sampler = Sampler::new(s, &t.layout, n, 3).unwrap();
-        for index in [0, 1, n / 2, n - 2, n - 1] {
-            for pixel in [PixelKey::new(0, 0), PixelKey::new(u32::MAX, u32::MAX)] {
-                let pairs = [&t.pixel, &t.lens, &t.light].map(|dim| sampler.get_2d(pixel, index, dim));
-                let all = pairs.into_iter().flatten().chain([sampler.get_1d(pixel, index, &t.pick)]);
-                for u in all {
-                    assert!((0.0..1.0).contains(&u), "{s}: index {index} reads {u}");
-                }
-            }
-        }
-    }
-}
-
-#[test]
-fn point_sets_of_awkward_sizes_stay_in_the_unit_square() {
-    for s in numbered_specs() {
-        for asked in [1, 2, 3, 5, 13, 31, 32, 33, 127, 257, 1000] {
-            let points = point_set(s, asked, 11).unwrap();
-            assert_eq!(points.len(), s.taken(asked) as usize, "{s}");
-            assert!(points.iter().flatten().all(|u| (0.0..1.0).contains(u)), "{s}, {asked} asked");
-        }
-    }
 }
 
 /// The order of asking, the object asked and the neighbours asked before must not matter.
@@ -122,31 +91,6 @@ fn is_digital(random: Random) -> bool {
     matches!(random, Random::None | Random::Xor | Random::Owen)
 }
 
-/// The numbers the renderer reads (24 bits) and those that are measured and plotted, for whole counts that are powers of two
-/// and for those that are not.
-#[test]
-fn every_aligned_block_of_the_sequences_is_a_net() {
-    let t = tickets();
-    let sequences = numbered_specs().into_iter().filter(|s| {
-        matches!(s.points, Points::Ld | Points::Sobol) && is_digital(s.random) && s.order != Order::Shuffle
-    });
-    let mut tried = 0;
-    for s in sequences {
-        for (n, seed) in [(64, 1), (48, 2), (200, 3)] {
-            let sampler = Sampler::new(s, &t.layout, n, seed).unwrap();
-            let read = as_f64(&span(&sampler, PixelKey::new(0, 0), &t.pixel));
-            let measured = point_set(s, n, seed).unwrap();
-            for m in 0..=n.ilog2() {
-                for (block, exact) in read.chunks_exact(1 << m).zip(measured.chunks_exact(1 << m)) {
-                    assert!(is_net(block) && is_net(exact), "{s}: a block of 2^{m} of {n}");
-                    tried += 1;
-                }
-            }
-        }
-    }
-    assert!(tried > 1000, "{tried} blocks");
-}
-
 /// In step every decision reads the pair's first two dimensions; shuffled, each reads the same net in an order of its own.
 #[test]
 fn whole_sets_are_nets_in_every_decision_also_shuffled() {
@@ -165,24 +109,6 @@ fn whole_sets_are_nets_in_every_decision_also_shuffled() {
                 assert!(is_net(&points), "{s}: {n} points of {}", dim.decision().name());
             }
         }
-    }
-}
-
-/// Cranley and Patterson's shift keeps each axis stratified and breaks the net.
-#[test]
-fn a_toroidal_shift_breaks_the_net_but_not_its_axes() {
-    for name in ["ld:step:shift", "hammersley:step:shift", "sobol:step:shift"] {
-        let mut worst = 0;
-        for seed in 0..32 {
-            let points = point_set(spec(name), 64, seed).unwrap();
-            for axis in [0, 1] {
-                let mut strata: Vec<u32> = points.iter().map(|p| (p[axis] * 64.0) as u32).collect();
-                strata.sort_unstable();
-                assert_eq!(strata, (0..64).collect::<Vec<_>>(), "{name}: axis {axis}");
-            }
-            worst = worst.max(t_value(&PointSet::new_2d(&points).unwrap()).unwrap());
-        }
-        assert!(worst > 0, "{name}: a net for 32 shifts in a row");
     }
 }
 
@@ -248,85 +174,6 @@ fn a_shuffled_set_is_the_set_in_step_in_another_order() {
     }
 }
 
-/// Numbers that one address gives over many seeds.
-struct Marginal {
-    what: String,
-    values: Vec<f64>,
-}
-
-const SEEDS: u64 = 1000;
-
-/// Coordinates of a few indices (first, one inside, last) of the pixel's and the light's decision over all seeds.
-fn marginals(s: SamplerSpec) -> Vec<Marginal> {
-    let t = tickets();
-    let n = 13;
-    let taken = s.taken(n);
-    let indices = [0, taken / 2, taken - 1];
-    let mut all: Vec<Marginal> = Vec::new();
-    for seed in 0..SEEDS {
-        let sampler = Sampler::new(s, &t.layout, n, seed).unwrap();
-        let mut at = 0;
-        for &index in &indices {
-            for dim in [&t.pixel, &t.light] {
-                for (axis, u) in sampler.get_2d(PixelKey::new(0, 0), index, dim).into_iter().enumerate() {
-                    if seed == 0 {
-                        let what = format!("{s}: axis {axis} of index {index}, {}", dim.decision().name());
-                        all.push(Marginal { what, values: Vec::new() });
-                    }
-                    all[at].values.push(f64::from(u));
-                    at += 1;
-                }
-            }
-        }
-    }
-    all
-}
-
-/// Fix an address, vary the seed. Kolmogorov–Smirnov on the number and on its lower twelve bits, which a wrong
-/// bit order or missing low bits would leave uneven; family-wise false-alarm rate 1e-7 for the file's uniformity tests (at
-/// most 3000). At 1000 seeds a distribution function that is off by 0.15 anywhere is caught.
-const UNIFORMITY: Family = Family { tests: 3000, false_alarm: 1e-7 };
-
-#[test]
-fn a_fixed_index_is_uniform_over_seeds_where_the_sampler_says_so() {
-    let mut tests = 0;
-    for s in numbered_specs().into_iter().filter(SamplerSpec::is_uniform_marginally) {
-        for marginal in marginals(s) {
-            let low_bits: Vec<f64> = marginal.values.iter().map(|u| (u * 4096.0).fract()).collect();
-            for (part, values) in [("value", &marginal.values), ("low bits", &low_bits)] {
-                let verdict = ks_uniform_test(values, UNIFORMITY);
-                assert!(verdict.holds(), "{}, {part}: {verdict}", marginal.what);
-                tests += 1;
-            }
-        }
-    }
-    assert!(tests > 1000 && tests <= UNIFORMITY.tests, "{tests} tests");
-}
-
-/// The exempt ones, fixed points, jitter that stays in its own stratum, the x of `yxor`.
-#[test]
-fn a_fixed_index_is_not_uniform_where_the_sampler_says_it_is_not() {
-    let fails = |m: &Marginal| !ks_uniform_test(&m.values, UNIFORMITY).holds();
-    let exempt: Vec<_> = numbered_specs().into_iter().filter(|s| !s.is_uniform_marginally()).collect();
-    assert!(exempt.len() > 10, "{}", exempt.len());
-    for s in exempt {
-        let all = marginals(s);
-        if s.random == Random::Yxor && s.order == Order::Step {
-            assert!(all.iter().filter(|m| m.what.contains("axis 0")).all(fails), "{s}: x is i/n for every seed");
-            assert!(!all.iter().filter(|m| m.what.contains("axis 1")).any(fails), "{s}: y is shifted");
-        } else if s.order == Order::Shuffle {
-            // A random element of a fixed set: 13 values of equal probability, a distance of up to 1/13 from uniform,
-            // which 1000 seeds do not tell apart at this level. What can be seen is that other numbers never occur.
-            let mut distinct = all[0].values.clone();
-            distinct.sort_by(f64::total_cmp);
-            distinct.dedup();
-            assert_eq!(distinct.len(), 13, "{s}");
-        } else {
-            assert!(all.iter().all(fails), "{s}");
-        }
-    }
-}
-
 /// (1/n) Σ f(u_i, v_i) over the samples of a pixel, one value a seed.
 fn pairings(s: SamplerSpec, n: u32, seeds: u64, f: impl Fn([f64; 2], [f64; 2]) -> f64) -> Vec<f64> {
     let t = tickets();
@@ -339,61 +186,8 @@ fn pairings(s: SamplerSpec, n: u32, seeds: u64, f: impl Fn([f64; 2], [f64; 2]) -
     (0..seeds).map(of_seed).collect()
 }
 
-const BEST: [&str; 6] = ["uniform:best", "stratified:best", "halton:best", "hammersley:best", "ld:best", "sobol:best"];
-
-/// E f(u) g(v) against E f · E g for all pairs of coordinates of two decisions (correlation 12 (u − ½)(v − ½), zero), pixel
-/// and lens, pixel and light, lens and light, and light pick against light point: a shared sequence gives up to 1.
-/// 6 samplers × 14 pairs × 2 counts at a family-wise false-alarm rate of 1e-7. However the n samples of a set hang together,
-/// its mean spreads by no more than one sample, so a correlation of (6.2 + 2.3)/√4000 = 0.14 is caught for any of them.
-#[test]
-fn decisions_of_the_best_presets_are_decoupled() {
-    let t = tickets();
-    let family = Family { tests: 6 * 14 * 2, false_alarm: 1e-7 };
-    for name in BEST {
-        for n in [4, 16] {
-            let mut sums = vec![Vec::new(); 14];
-            for seed in 0..4000 {
-                let sampler = Sampler::new(spec(name), &t.layout, n, seed).unwrap();
-                let [pixel, lens, light] =
-                    [&t.pixel, &t.lens, &t.light].map(|d| span(&sampler, PixelKey::new(1, 1), d));
-                let mut sum = [0.0; 14];
-                for i in 0..sampler.samples() as usize {
-                    let centred = |p: &[f32; 2]| p.map(|u| f64::from(u) - 0.5);
-                    let [p, l, q] = [centred(&pixel[i]), centred(&lens[i]), centred(&light[i])];
-                    let pick = f64::from(sampler.get_1d(PixelKey::new(1, 1), i as u32, &t.pick)) - 0.5;
-                    let products = [(p, l), (p, q), (l, q)]
-                        .into_iter()
-                        .flat_map(|(a, b)| [a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1]])
-                        .chain([pick * q[0], pick * q[1]]);
-                    for (sum, product) in sum.iter_mut().zip(products) {
-                        *sum += 12.0 * product / f64::from(sampler.samples());
-                    }
-                }
-                sums.iter_mut().zip(sum).for_each(|(all, sum)| all.push(sum));
-            }
-            for (pair, replicates) in sums.iter().enumerate() {
-                let verdict = t_test(replicates, 0.0, family);
-                assert!(verdict.holds(), "{name}, n = {n}, pair {pair}: {verdict}");
-                assert!(verdict.detects.unwrap() < 0.14, "{name}: {verdict}");
-            }
-        }
-    }
-}
-
 fn squared_distance(u: [f64; 2], v: [f64; 2]) -> f64 {
     (u[0] - v[0]).powi(2) + (u[1] - v[1]).powi(2)
-}
-
-/// f = ‖u − v‖² over two decisions, truth 1/3: right for every best preset. 12 tests at 1e-7 together.
-#[test]
-fn the_best_presets_get_the_distance_of_two_decisions_right() {
-    let family = Family { tests: 12, false_alarm: 1e-7 };
-    for name in BEST {
-        for n in [16, 64] {
-            let verdict = t_test(&pairings(spec(name), n, 3000, squared_distance), 1.0 / 3.0, family);
-            assert!(verdict.holds(), "{name}, n = {n}: {verdict}");
-        }
-    }
 }
 
 /// The sheet read literally, limit by limit, each derived:

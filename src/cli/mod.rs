@@ -264,7 +264,7 @@ impl Explain {
     fn run(self) -> Result<()> {
         let set = self.decisions.set(&self.sampler)?;
         let mut text = match set.single() {
-            Some(spec) => format!("{} = {}\n{}\n", self.sampler, spec.expansion(), spec.describe()),
+            Some(spec) => format!("{} = {}\n{}\n{}", self.sampler, spec.expansion(), spec.describe(), domain(spec)),
             None => by_decision(&set),
         };
         if Decision::ALL.iter().any(|&d| d.dimensions() == 2 && set.of(d).points == Points::Stratified) {
@@ -282,6 +282,11 @@ impl Explain {
         }
         print(&text)
     }
+}
+
+/// Where a sampler is defined, in a line; `center` is wherever there are decisions for it.
+fn domain(spec: SamplerSpec) -> String {
+    if spec.points == Points::Center { String::new() } else { format!("Domain: {}\n", spec.domain()) }
 }
 
 /// What a set of different samplers does, decision by decision.

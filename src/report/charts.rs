@@ -11,6 +11,7 @@ use super::bias_variance::{self, BiasVariance, Group, bias_variance_chart};
 use super::dots::{Dot, DotGroup, DotRow, dot_chart};
 use super::figure::{Figure, Rgb8};
 use super::frame::Frame;
+use super::gallery;
 use super::numbers::{counted, listed};
 use super::pareto::{Trial, pareto_chart};
 use super::pictures::{NamedPoints, point_set_contact_sheet};
@@ -62,6 +63,13 @@ pub fn point_sets(summary: &Summary) -> Option<Rgb8> {
         })
         .collect();
     sets.map(|sets| point_set_contact_sheet(&sets, families.len()))
+}
+
+/// Point sets that show failures, and below each the sound way.
+pub fn failures(summary: &Summary) -> Option<Rgb8> {
+    let sets = gallery::panels(summary.about.experiment.seed)?;
+    let columns = sets.len() / 2;
+    Some(point_set_contact_sheet(&sets, columns))
 }
 
 /// Star discrepancy against the number of points; `None` without such rows.

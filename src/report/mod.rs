@@ -2,10 +2,12 @@
 //!
 //! [`write()`] is the whole of it: rows → [`summarise()`] → figures, tables, `report.md`.
 pub mod bias_variance;
+pub mod coupling;
 pub mod dots;
 pub mod evidence;
 pub mod figure;
 pub mod frame;
+pub mod gallery;
 pub mod markdown;
 pub mod numbers;
 pub mod pairing;
@@ -19,6 +21,7 @@ pub mod stability;
 pub mod style;
 pub mod summarise;
 pub mod tables;
+pub mod verdicts;
 
 mod ablation;
 mod axis;
@@ -30,6 +33,6 @@ mod pictured;
 mod sections;
 mod write;
 
-pub use sections::report as text;
+pub use sections::{Measurements, report as text, report_with as text_with};
 pub use summarise::{Summary, summarise};
 pub use write::{FigureState, Figures, Written, write};

@@ -79,6 +79,22 @@ pub fn percent(share: f64) -> String {
     if value == 0.0 { "0 %".to_owned() } else { format!("{sign}{:.*} %", (1 - exponent).max(0) as usize, value.abs()) }
 }
 
+/// A p-value: two significant digits from 0.001 on, below that only that it is below; `–` where there is none.
+pub fn p_value(p: Option<f64>) -> String {
+    match p {
+        None => "–".to_owned(),
+        Some(p) if p < 0.001 => "< 0.001".to_owned(),
+        Some(p) if p < 0.095 => format!("{p:.*}", if p < 0.0095 { 4 } else { 3 }),
+        Some(p) => format!("{p:.2}"),
+    }
+}
+
+/// `p = 0.023` or `p < 0.001`, for sentences.
+pub fn p_words(p: Option<f64>) -> String {
+    let text = p_value(p);
+    if text.starts_with('<') { format!("p {text}") } else { format!("p = {text}") }
+}
+
 /// `1 replicate`, `8 replicates`.
 pub fn counted(n: usize, singular: &str, plural: &str) -> String {
     format!("{n} {}", if n == 1 { singular } else { plural })
@@ -128,6 +144,15 @@ mod tests {
         assert_eq!(estimate(&e(None)), "0.500 (no interval)");
         assert_eq!((slope_text(-0.6651), slope_text(-0.0001)), ("−0.665".to_owned(), "0.000".to_owned()));
         assert_eq!(signed_estimate(&Estimate { value: -0.501, ci95: Some([-0.52, -0.001]) }), "−0.50 [−0.52, 0.00]");
+    }
+
+    #[test]
+    fn p_values_claim_no_more_digits_than_they_have() {
+        let cases = [(None, "–"), (Some(0.0), "< 0.001"), (Some(0.00123), "0.0012"), (Some(0.0234), "0.023")];
+        for (p, text) in cases.into_iter().chain([(Some(0.5), "0.50"), (Some(1.0), "1.00")]) {
+            assert_eq!(p_value(p), text);
+        }
+        assert_eq!((p_words(Some(1e-9)), p_words(Some(0.2))), ("p < 0.001".to_owned(), "p = 0.20".to_owned()));
     }
 
     #[test]

@@ -48,6 +48,13 @@ pub fn measure(spec: &SamplerSpec, seed: u64) -> Option<Vec<Paired>> {
 }
 
 fn at_count(spec: SamplerSpec, n: u32, seed: u64) -> Option<Paired> {
+    let means = means(spec, n, seed)?;
+    let moments: Moments = means.iter().copied().collect();
+    Some(Paired { mean: t_interval(&means, 0.95), spread: moments.std()? })
+}
+
+/// The mean of ‖u − v‖² over `n` samples in each of [`REPLICATES`] randomisations; `None` for a count that is none.
+pub fn means(spec: SamplerSpec, n: u32, seed: u64) -> Option<Vec<f64>> {
     let mut layout = SampleLayout::default();
     let (pixel, lens) = (layout.claim_2d(Decision::Pixel), layout.claim_2d(Decision::Lens));
     let replicate = |i: u32| {
@@ -60,9 +67,7 @@ fn at_count(spec: SamplerSpec, n: u32, seed: u64) -> Option<Paired> {
         let terms = (0..count).map(|j| square(ux[j], vx[j]) + square(uy[j], vy[j]));
         Some(sum(terms) / count as f64)
     };
-    let means: Vec<f64> = (0..REPLICATES).map(replicate).collect::<Option<_>>()?;
-    let moments: Moments = means.iter().copied().collect();
-    Some(Paired { mean: t_interval(&means, 0.95), spread: moments.std()? })
+    (0..REPLICATES).map(replicate).collect()
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use super::frame::{
 };
 use super::labels::first_free;
 use super::legend::{Ending, KEY, LABEL_STEP, LEADER, Legend, draw_column};
-use super::style::{GREY, PALE, Style, draw_marker, lightened, style_of};
+use super::style::{GREY, INK, PALE, Style, draw_marker, lightened, style_of};
 
 /// One measured value of a series.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,7 +100,7 @@ fn drawn_large(frame: &Frame, plot: &Plot) -> Drawing {
     let panel = Panel::new(&axes, bounds);
     panel.draw_frame(&mut drawing, true, true);
     draw_axis_names(&mut drawing, &bounds, frame);
-    let mut column = panel.draw_helpers(&mut drawing, &plot, true);
+    let mut column = panel.draw_helpers(&mut drawing, &plot, true, &mut panel.boxes(&plot));
     column.extend(panel.draw_lines(&mut drawing, &plot));
     draw_column(&mut drawing, &bounds, &column, widest);
     drawing
@@ -128,7 +128,9 @@ fn drawn_grid(frame: &Frame, plots: &[Plot], columns: usize) -> Drawing {
         let panel = Panel::new(&axes, b);
         drawing.heading((b.left, b.top - 7.0), &shortened(&plot.title, HEADING, true, b.right - b.left));
         panel.draw_frame(&mut drawing, i % cells.columns == 0, i + cells.columns >= plots.len());
-        panel.draw_helpers(&mut drawing, plot, false);
+        let mut taken = panel.boxes(plot);
+        panel.draw_series_labels(&mut drawing, plot, &mut taken);
+        panel.draw_helpers(&mut drawing, plot, false, &mut taken);
         panel.draw_lines(&mut drawing, plot);
     }
     if plots.is_empty() {
@@ -197,6 +199,10 @@ fn data(plots: &[Plot]) -> impl Iterator<Item = &Datum> {
     plots.iter().flat_map(|plot| &plot.series).flat_map(|series| &series.points)
 }
 
+/// Half the width that a series takes for its line and markers, and how far names keep from lines that are not theirs.
+const SERIES_ROOM: f64 = 3.0;
+const CLEAR: f64 = 9.0;
+
 /// A floor further than this below the smallest value would squeeze the data; it is told in words instead.
 const FLOOR_REACH: f64 = 20.0;
 /// How far an interval may widen the range beyond the values: its low end can be anywhere above 0.
@@ -262,8 +268,22 @@ impl<'a> Panel<'a> {
 
     /// Guides and floor. With `beside`, labels of those that reach the right edge are returned for the column beside
     /// the plot; all others are written along the lines.
-    fn draw_helpers(&self, drawing: &mut Drawing, plot: &Plot, beside: bool) -> Vec<Ending> {
+    fn draw_helpers(&self, drawing: &mut Drawing, plot: &Plot, beside: bool, taken: &mut Vec<Bounds>) -> Vec<Ending> {
         let mut column = Vec::new();
+        for (line, dash, label) in self.helpers(plot) {
+            drawing.line(&line, 1.1, PALE, dash);
+            let end = line[1];
+            if beside && end.0 > self.b.right - 0.5 {
+                column.push(Ending { at: end, text: label.to_owned(), style: None });
+                continue;
+            }
+            self.draw_inside_label(drawing, &line, label, taken);
+        }
+        column
+    }
+
+    /// Guides and floor: where they run, their dash and their name.
+    fn helpers<'p>(&self, plot: &'p Plot) -> Vec<(Vec<Place>, Dash, &'p str)> {
         let floor = plot.floor.iter().filter(|floor| self.y.holds(floor.value)).map(|floor| {
             let y = self.y.pixel(floor.value);
             (vec![(self.b.left, y), (self.b.right, y)], Dash::Dotted, floor.label.as_str())
@@ -272,20 +292,50 @@ impl<'a> Panel<'a> {
             .guides
             .iter()
             .filter_map(|guide| Some((self.guide(plot, guide.slope)?, Dash::Solid, guide.label.as_str())));
-        let helpers: Vec<_> = floor.chain(guides).collect();
-        let mut taken: Vec<Bounds> =
-            plot.series.iter().flat_map(|series| boxes_along(&self.places(series), 3.0)).collect();
-        taken.extend(helpers.iter().flat_map(|(line, ..)| boxes_along(line, 1.0)));
-        for (line, dash, label) in helpers {
-            drawing.line(&line, 1.1, PALE, dash);
-            let end = line[1];
-            if beside && end.0 > self.b.right - 0.5 {
-                column.push(Ending { at: end, text: label.to_owned(), style: None });
-                continue;
+        floor.chain(guides).collect()
+    }
+
+    /// What labels keep clear of: series and helper lines.
+    fn boxes(&self, plot: &Plot) -> Vec<Bounds> {
+        let series = plot.series.iter().flat_map(|series| boxes_along(&self.places(series), SERIES_ROOM));
+        series.chain(self.helpers(plot).iter().flat_map(|(line, ..)| boxes_along(line, 1.0))).collect()
+    }
+
+    /// Writes each series' name along its last steps, where there is room beside it and no other line is as near; lines that
+    /// run together have the legend alone.
+    fn draw_series_labels(&self, drawing: &mut Drawing, plot: &Plot, taken: &mut Vec<Bounds>) {
+        for (i, series) in plot.series.iter().enumerate() {
+            let places = self.places(series);
+            let others = plot.series.iter().enumerate().filter(|(other, _)| *other != i);
+            let near: Vec<Bounds> = others
+                .flat_map(|(_, other)| boxes_along(&self.places(other), CLEAR))
+                .chain(taken.iter().copied())
+                .collect();
+            let text = |at: Place| Text {
+                at,
+                text: series.label.clone(),
+                size: 10.5,
+                bold: false,
+                colour: INK,
+                align: Align::Right,
+                turned: false,
+            };
+            let width = text_width(&series.label, 10.5, false);
+            let candidates = places.windows(2).rev().take(2).flat_map(|ends| {
+                let (from, to) = (ends[0], ends[1]);
+                let places = &places;
+                (0..12).flat_map(move |step| {
+                    let x = to.0 - f64::from(step) * (to.0 - from.0) / 12.0;
+                    let (highest, lowest) = span(places, x - width, x);
+                    [(x, highest - SERIES_ROOM - 4.0), (x, lowest + SERIES_ROOM + 11.0)]
+                })
+            });
+            let candidates = candidates.map(|at| (text(at).bounds(), at));
+            if let Some((bounds, at)) = first_free(candidates, &self.b, &near) {
+                taken.push(bounds);
+                drawing.add_text(text(at));
             }
-            self.draw_inside_label(drawing, &line, label, &mut taken);
         }
-        column
     }
 
     /// The visible part of the line of `slope` through the middle (in logarithms) of the series' first values.
@@ -408,6 +458,17 @@ fn boxes_along(line: &[Place], half: f64) -> Vec<Bounds> {
         (0..=steps).map(at)
     });
     pieces.map(|(x, y)| Bounds { left: x - half, top: y - half, right: x + half, bottom: y + half }).collect()
+}
+
+/// The least and the largest y of a line between two x, the line going on level beyond its ends.
+fn span(line: &[Place], left: f64, right: f64) -> (f64, f64) {
+    let at = |x: f64| {
+        let step = line.windows(2).find(|ends| ends[0].0 <= x && x <= ends[1].0 && ends[0].0 < ends[1].0);
+        let beyond = line.first().filter(|first| x < first.0).or(line.last()).map_or(0.0, |place| place.1);
+        step.map_or(beyond, |e| e[0].1 + (x - e[0].0) / (e[1].0 - e[0].0) * (e[1].1 - e[0].1))
+    };
+    let inner = line.iter().filter(|place| left < place.0 && place.0 < right).map(|place| place.1);
+    inner.chain([at(left), at(right)]).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(y), h.max(y)))
 }
 
 /// Everything that may be labelled in the column beside a chart.

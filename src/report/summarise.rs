@@ -3,21 +3,23 @@
 //! Pure: the same rows give the same summary. What the experiment asks for and the rows do not hold is counted in
 //! [`Summary::missing`], never guessed.
 
+mod others;
+mod samplers;
 mod variants;
 
 use std::collections::HashMap;
 
 use crate::experiment::results::{
-    About, Count, EnsembleRow, Estimator, ImageRow, Kind, PointsRow, ReferenceRow, Row, SceneFacts, Stage, Timing,
-    TwinDifference, Variant, is_enough,
+    About, Count, EnsembleRow, Estimator, ImageRow, Kind, PointsRow, ReferenceRow, Row, Timing, TwinDifference,
+    Variant, is_enough,
 };
-use crate::experiment::spec::{Experiment, Pictures, SamplerEntry};
-use crate::sampling::{Decision, Order, Points, Preset, Random, SamplerSet, SamplerSpec, Scope};
-use crate::stats::{Estimate, SlopeFit, slope_with_interval, t_interval};
+use crate::experiment::spec::Experiment;
+use crate::sampling::{Decision, Points, Preset};
+use crate::stats::{Estimate, SlopeFit};
 
 use super::evidence::{Course, clearly_above_one, ratio, ratio_of_roots};
-use super::shots::{PictureSet, Shot};
-use super::style::{Style, style_of, style_of_set};
+use super::shots::PictureSet;
+pub use samplers::SamplerSummary;
 pub use variants::Subject;
 
 /// Counts that a slope of RMSE is fitted over: powers of two from 4 to 256 that the sampler takes as asked.
@@ -86,69 +88,6 @@ impl SceneSummary {
     /// RMSE of the reference itself, in radiance; 0 for a closed form.
     pub fn reference_rmse(&self) -> Option<f64> {
         self.reference.as_ref().map(|reference| reference.noise_mse.max(0.0).sqrt())
-    }
-}
-
-/// A sampler of the experiment.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SamplerSummary {
-    /// Full form.
-    pub canonical: String,
-    /// What the experiment calls it.
-    pub names: Vec<String>,
-    /// What figures and tables call it: the one name, or the family where several presets are one sampler.
-    pub label: String,
-    /// What it does, decision by decision; `None` where this version cannot read its text.
-    pub set: Option<SamplerSet>,
-    /// Its look in every figure.
-    pub style: Style,
-}
-
-impl SamplerSummary {
-    /// What it does for every decision; `None` where decisions differ, or where this version cannot read its text.
-    pub fn spec(&self) -> Option<SamplerSpec> {
-        self.set.and_then(|set| set.single())
-    }
-
-    /// Whether `text` names it: as the experiment calls it, or by another text of the same meaning.
-    pub fn is_meant_by(&self, text: &str) -> bool {
-        let means = || SamplerSet::parse(text, Preset::Best).is_ok_and(|set| set.to_string() == self.canonical);
-        self.names.iter().any(|name| name == text) || means()
-    }
-
-    /// Whether it is a set of different samplers for different decisions.
-    pub fn is_mixed(&self) -> bool {
-        self.set.is_some_and(|set| set.single().is_none())
-    }
-
-    /// Why nothing promises that its image becomes the right one in a scene with `decisions`, however small the bias that is
-    /// seen; `None` where its construction does, or where it cannot be read.
-    ///
-    /// Uniform numbers are independent in any order. Of other sets two decisions that read the same points in the same order
-    /// never see most combinations; without a randomisation, or with one that leaves an axis as it is, there is no average
-    /// over images that is right by construction.
-    pub fn unproven(&self, decisions: &[Decision]) -> Option<&'static str> {
-        let set = self.set?;
-        let specs: Vec<SamplerSpec> = decisions.iter().map(|&decision| set.of(decision)).collect();
-        let is_set = |spec: &&SamplerSpec| spec.points != Points::Uniform;
-        if specs.iter().filter(is_set).filter(|spec| spec.order == Order::Step).count() > 1 {
-            return Some("decisions in step");
-        }
-        let leaves_an_axis = |spec: &SamplerSpec| spec.random == Random::Yxor && spec.order != Order::Shuffle;
-        let mut specs = specs.iter().filter(is_set);
-        let found = specs.find(|spec| !spec.is_random() || leaves_an_axis(spec))?;
-        Some(if found.is_random() { "an axis that is not randomised" } else { "nothing random" })
-    }
-
-    /// Whether each pixel sees the same points, or one axis of them, in some decision, so that neighbours may err alike.
-    pub fn repeats_in_every_pixel(&self) -> bool {
-        let repeats = |spec: SamplerSpec| {
-            let is_shared = matches!(spec.scope, Scope::Image | Scope::Decision);
-            // Hammersley's x = i/n is untouched by a shift of y; a shuffle of the indices mixes it anew.
-            let has_fixed_axis = spec.random == Random::Yxor && spec.order == Order::Step;
-            !spec.is_random() || is_shared || has_fixed_axis
-        };
-        self.set.is_some_and(|set| Decision::ALL.iter().any(|&decision| repeats(set.of(decision))))
     }
 }
 
@@ -402,7 +341,7 @@ fn course(from: &Cell, to: &Cell) -> Option<Course> {
 /// [`Summary::speeds`] comes from them.
 pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
     let index = Index::new(rows, &about.experiment);
-    let samplers = samplers(&about.experiment);
+    let samplers = samplers::of(&about.experiment);
     let mut summary = Summary {
         about: about.clone(),
         scenes: (0..about.scenes.len()).map(|i| index.scene(about, i)).collect(),
@@ -419,7 +358,7 @@ pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
     };
     summary.left_out = left_out(&summary, about);
     index.add_cells(&mut summary);
-    add_slopes(&mut summary);
+    others::add_slopes(&mut summary);
     index.add_stability(&mut summary);
     index.add_shortcut(&mut summary);
     index.add_points(&mut summary);
@@ -438,53 +377,6 @@ fn left_out(summary: &Summary, about: &About) -> Vec<(usize, usize, usize)> {
     let sampler = |canonical: &str| summary.samplers.iter().position(|sampler| sampler.canonical == canonical);
     let indices = about.left_out.iter().map(|l| Some((scene(&l.scene)?, sampler(&l.sampler)?, sampler(&l.same_as)?)));
     indices.flatten().collect()
-}
-
-/// The experiment's samplers, texts that mean the same one together.
-fn samplers(experiment: &Experiment) -> Vec<SamplerSummary> {
-    let mut samplers: Vec<SamplerSummary> = Vec::new();
-    for entry in &experiment.samplers {
-        let (text, name) = (entry.text(), entry.name().to_owned());
-        let set = SamplerSet::parse(&text, Preset::Best).ok();
-        let canonical = set.map_or(text, |set| set.to_string());
-        match samplers.iter_mut().find(|known| known.canonical == canonical) {
-            Some(known) => {
-                known.names.push(name);
-                known.label = label(&known.names);
-            }
-            None => {
-                // A name of one's own is kept as it is.
-                let label = if matches!(entry, SamplerEntry::Set { .. }) {
-                    name.clone()
-                } else {
-                    label(std::slice::from_ref(&name))
-                };
-                let style = look(&label, set.as_ref());
-                samplers.push(SamplerSummary { canonical, names: vec![name], label, set, style });
-            }
-        }
-    }
-    for sampler in &mut samplers {
-        sampler.style = look(&sampler.label, sampler.set.as_ref());
-    }
-    samplers
-}
-
-/// How a sampler looks in figures: by its name, or by its decisions where they differ.
-fn look(label: &str, set: Option<&SamplerSet>) -> Style {
-    set.filter(|set| set.single().is_none()).map_or_else(|| style_of(label), style_of_set)
-}
-
-/// One name for a sampler of several: the part before the first colon, where they share it.
-fn label(names: &[String]) -> String {
-    let family = |name: &str| name.split(':').next().unwrap_or(name).to_owned();
-    match names {
-        [one] if one.contains(':') || one == "center" => one.clone(),
-        // What a bare name stood for.
-        [one] => format!("{one}:best"),
-        _ if names.iter().all(|name| family(name) == family(&names[0])) => family(&names[0]),
-        _ => names.join(" = "),
-    }
 }
 
 /// Scene, sampler, count asked for, estimator and variant.
@@ -646,146 +538,9 @@ impl<'a> Index<'a> {
             twins: members.iter().filter_map(|m| m.twin.clone()).collect(),
         }
     }
-
-    /// Point-set metrics, means over replicates.
-    fn add_points(&self, summary: &mut Summary) {
-        let Some(points) = summary.about.experiment.points.clone() else { return };
-        let (mut missing, mut expected) = (0, 0);
-        for sampler in (0..summary.samplers.len()).filter(|&i| !summary.samplers[i].is_mixed()).collect::<Vec<_>>() {
-            for &n in &points.n {
-                let p = &summary.samplers[sampler];
-                expected += 1;
-                let Some(sets) = self.points.get(&(p.canonical.as_str(), n)) else {
-                    missing += 1;
-                    continue;
-                };
-                let is_fixed = p.spec().is_some_and(|spec| !spec.is_random());
-                let of_metric = |metric: &String| point_set(sampler, metric, sets, is_fixed);
-                summary.point_sets.extend(points.metrics.iter().map(of_metric));
-            }
-        }
-        if missing > 0 {
-            summary.missing.push(format!("{missing} of {expected} point sets"));
-        }
-    }
-
-    /// Pictures by scene, sampler and count, what they were compared with, and the stages beside them.
-    fn add_pictures(&self, summary: &mut Summary, timings: &[Timing]) {
-        let times: HashMap<&str, &Timing> = timings.iter().map(|timing| (timing.id.as_str(), timing)).collect();
-        let (mut pictures, mut stages) = ([0, 0], [0, 0]);
-        for asked in &summary.about.experiment.pictures {
-            let Some(scene) = summary.about.experiment.scenes.iter().position(|name| *name == asked.scene) else {
-                continue;
-            };
-            let Some(facts) = summary.about.scenes.get(scene) else { continue };
-            let set = self.picture_set(summary, asked, scene, facts, &times);
-            pictures = [pictures[0] + set.shots.len(), pictures[1] + summary.compared(scene).count() * asked.spp.len()];
-            stages = [stages[0] + set.stages.len(), stages[1] + set.stages_planned()];
-            summary.pictured.push(set);
-        }
-        for ([found, planned], word) in [(pictures, "pictures"), (stages, "stages of Figure 1")] {
-            if found < planned {
-                summary.missing.push(format!("{} of {planned} {word}", planned - found));
-            }
-        }
-    }
-
-    /// The pictures of one scene.
-    fn picture_set(
-        &self,
-        summary: &Summary,
-        asked: &Pictures,
-        scene: usize,
-        facts: &SceneFacts,
-        times: &HashMap<&str, &Timing>,
-    ) -> PictureSet {
-        let ours = |row: &&&ImageRow| row.scene == facts.name && row.size == asked.size;
-        let find = |sampler: usize, spp: u32| -> Option<Shot> {
-            let canonical = &summary.samplers[sampler].canonical;
-            let is_it = |row: &&&ImageRow| row.sampler == *canonical && row.spp.asked == spp;
-            let row = self.pictures.iter().filter(ours).rfind(is_it)?;
-            let time = times.get(row.id.as_str());
-            Some(Shot {
-                sampler,
-                row: (*row).clone(),
-                seconds: time.map(|time| time.seconds),
-                threads_and_load: time.and_then(|time| Some((time.threads, time.load?))),
-            })
-        };
-        let wanted = summary.compared(scene).flat_map(|sampler| asked.spp.iter().map(move |&spp| (sampler, spp)));
-        let shots: Vec<Shot> = wanted.filter_map(|(sampler, spp)| find(sampler, spp)).collect();
-        let stage = |stage: &Stage| self.stages.iter().filter(ours).rfind(|row| row.stage == *stage).copied().cloned();
-        let id = shots.iter().find_map(|shot| shot.row.errors.as_ref()).map(|errors| errors.reference_id.as_str());
-        PictureSet {
-            scene,
-            pictures: asked.clone(),
-            exposure: facts.exposure,
-            has_lens: facts.lens,
-            has_lights: facts.layout.contains(Decision::LightPoint.name()),
-            reference: id.and_then(|id| self.references.get(id)).map(|&row| row.clone()),
-            stages: Stage::ALL.iter().filter_map(stage).collect(),
-            shots,
-        }
-    }
-
-    /// Seconds of the images of each cell; of an image that was timed twice the last time counts.
-    fn add_speeds(&self, summary: &mut Summary, timings: &[Timing]) {
-        let by_id: HashMap<&str, &Timing> = timings.iter().map(|timing| (timing.id.as_str(), timing)).collect();
-        for cell in &summary.cells {
-            let (s, p) = (&summary.scenes[cell.scene], &summary.samplers[cell.sampler]);
-            let members = self.plain(s, p, cell.spp.asked).into_iter().flat_map(|row| &row.members);
-            let timed: Vec<&Timing> = members.filter_map(|id| by_id.get(id.as_str()).copied()).collect();
-            let Some(seconds) = median(timed.iter().map(|timing| timing.seconds).collect()) else { continue };
-            let threads = timed.iter().map(|timing| timing.threads).max().unwrap_or(1);
-            let Cell { scene, sampler, spp, .. } = *cell;
-            summary.speeds.push(Speed { scene, sampler, spp, seconds, images: timed.len(), threads });
-        }
-    }
 }
 
 /// Whether another seed gives the same image of the scene.
 fn is_fixed(sampler: &SamplerSummary, scene: &SceneSummary) -> bool {
     sampler.set.is_some_and(|set| !set.is_random_for(&scene.decisions))
-}
-
-fn point_set(sampler: usize, metric: &str, sets: &[&PointsRow], is_fixed: bool) -> PointSet {
-    let values: Vec<Option<f64>> = sets.iter().map(|row| row.metrics.get(metric).copied().flatten()).collect();
-    let all: Option<Vec<f64>> = values.iter().copied().collect();
-    let mean = all.filter(|all| !all.is_empty()).map(|all| match is_fixed {
-        true => Estimate { value: all[0], ci95: Some([all[0]; 2]) },
-        false => t_interval(&all, 0.95),
-    });
-    let (n, id) = (sets[0].n, sets[0].id.clone());
-    PointSet { sampler, n, metric: metric.to_owned(), mean, values, id }
-}
-
-/// The middle value with the range as its interval.
-fn median(mut values: Vec<f64>) -> Option<Estimate> {
-    values.sort_by(f64::total_cmp);
-    let (&low, &high) = (values.first()?, values.last()?);
-    let middle = (values[(values.len() - 1) / 2] + values[values.len() / 2]) / 2.0;
-    Some(Estimate { value: middle, ci95: (values.len() > 1).then_some([low, high]) })
-}
-
-/// Slopes of RMSE, by scene and sampler.
-fn add_slopes(summary: &mut Summary) {
-    let seed = summary.about.experiment.seed;
-    for scene in 0..summary.scenes.len() {
-        for sampler in summary.compared(scene).collect::<Vec<_>>() {
-            let cells = summary.cells_of(scene, sampler);
-            let is_usable = |cell: &&&Cell| {
-                SLOPE_COUNTS.contains(&cell.spp.asked)
-                    && cell.spp.asked.is_power_of_two()
-                    && cell.spp.taken == cell.spp.asked
-                    && !cell.is_reference_limited
-                    && cell.replicate_mse.len() == cell.replicates as usize
-            };
-            let cells: Vec<&Cell> = cells.iter().filter(is_usable).copied().collect();
-            let ns: Vec<f64> = cells.iter().map(|cell| f64::from(cell.spp.taken)).collect();
-            let mse: Vec<Vec<f64>> = cells.iter().map(|cell| cell.replicate_mse.clone()).collect();
-            let counts = cells.iter().map(|cell| cell.spp.taken).collect();
-            let fit = slope_with_interval(&ns, &mse, seed);
-            summary.slopes.push(Slope { scene, sampler, counts, fit });
-        }
-    }
 }

@@ -107,6 +107,7 @@ fn draw(dir: &Path, summary: &Summary) -> Result<Figures> {
         Pen { folder: dir.join("figures"), stamp: provenance::line(&summary.about), figures: Figures::default() };
     let no_rows = || "its rows are not there".to_owned();
     pen.raster("point-sets", charts::point_sets(summary).ok_or_else(no_rows))?;
+    pen.raster("failures", charts::failures(summary).ok_or_else(no_rows))?;
     pen.chart("discrepancy", charts::discrepancy(summary))?;
     pen.chart("convergence", charts::convergence(summary))?;
     pen.chart("bias-and-variance", charts::bias_and_variance(summary))?;

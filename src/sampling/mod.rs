@@ -2,6 +2,7 @@
 //!
 //! A number is R_key(P(π(i), D)): point set P, index order π, dimensions D of the decision, randomisation R under a key.
 
+mod domain;
 pub mod hash;
 mod layout;
 pub mod radical;
@@ -12,6 +13,7 @@ mod spec;
 pub mod strata;
 pub mod warp;
 
+pub use domain::{Domain, LAYOUT_DIMENSIONS, domain_table};
 pub use layout::{Claim, Decision, Dim1, Dim2, SampleLayout};
 pub use sampler::{ALGORITHM, PixelKey, PointSource, Sampler, point_set};
 pub use set::SamplerSet;

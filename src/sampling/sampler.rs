@@ -26,7 +26,8 @@ impl PixelKey {
 /// Numbers for the decisions of a scene.
 ///
 /// The `fill` functions write a span of consecutive sample indices of one pixel and are the way of the render loop;
-/// single look-ups are spans of length 1.
+/// single look-ups are spans of length 1. Indices from `samples()` on belong to no set: asking for them is a mistake of the
+/// program and stops it ([`Sampler::check_index`] asks first).
 pub trait PointSource: Sync {
     /// Samples per pixel; indices are `0..samples()`.
     fn samples(&self) -> u32;
@@ -85,6 +86,44 @@ impl Sampler {
         Ok(Self { decisions, samples })
     }
 
+    /// Whether sample `index` exists: for indices that come from outside. A set belongs to its count, so none of its points
+    /// lies beyond; more samples are another sampler's, made for their count.
+    ///
+    /// # Errors
+    /// Kind `Input` with the range.
+    pub fn check_index(&self, index: u64) -> Result<()> {
+        match index < u64::from(self.samples) {
+            true => Ok(()),
+            false => Err(Error::input("sample index", format!("expected 0 to {}, found {index}", self.samples - 1))),
+        }
+    }
+
+    /// Gives the sampler another seed: as [`Self::new`] with that seed, without making its tables anew.
+    pub fn reseed(&mut self, seed: u64) {
+        for source in self.decisions.iter_mut().flatten() {
+            source.reseed(seed);
+        }
+    }
+
+    /// The integers behind [`fill_2d`](PointSource::fill_2d): 32-bit fractions of samples `first .. first + x.len()`, of
+    /// which the renderer reads the top 24 bits. Elementary intervals are counted on these. `center` has one half.
+    pub fn fractions_2d(&self, pixel: PixelKey, first: u32, dim: &Dim2, x: &mut [u32], y: &mut [u32]) {
+        assert_eq!(x.len(), y.len());
+        let source = self.decision(dim.decision());
+        if source.spec.points == Points::Center {
+            x.fill(1 << 31);
+            y.fill(1 << 31);
+            return;
+        }
+        let keys = source.keys(pixel);
+        for (block, (x, y)) in x.chunks_mut(BLOCK).zip(y.chunks_mut(BLOCK)).enumerate() {
+            let places = source.places(first + (block * BLOCK) as u32, x.len(), &keys);
+            for (axis, out) in [x, y].into_iter().enumerate() {
+                source.fractions(axis, &places[..out.len()], &keys, |at, fraction| out[at] = fraction);
+            }
+        }
+    }
+
     fn decision(&self, decision: Decision) -> &DecisionSampler {
         self.decisions[decision as usize]
             .as_ref()
@@ -131,6 +170,7 @@ const BLOCK: usize = 16;
 #[derive(Debug, Clone)]
 struct DecisionSampler {
     spec: SamplerSpec,
+    decision: Decision,
     /// 1-D decisions of stratified sets, and of the sheet's presets, have n strata on a line.
     strata: (u32, u32),
     samples: u32,
@@ -177,7 +217,6 @@ const SHUFFLE_TAG: u64 = 2;
 
 impl DecisionSampler {
     fn new(mut spec: SamplerSpec, claim: Claim, samples: u32, seed: u64) -> Self {
-        let decision = claim.decision as u64;
         let one_d = claim.count == 1;
         if one_d && spec.sheet_1d {
             spec = sheet_1d(spec);
@@ -209,18 +248,27 @@ impl DecisionSampler {
             }
             _ => (samples, 1),
         };
-        let random_path: &[u64] = match spec.scope {
-            Scope::Decision | Scope::Each => &[RANDOM_TAG, decision],
-            Scope::Image | Scope::Pixel => &[RANDOM_TAG],
-        };
-        Self {
+        let mut made = Self {
             spec,
+            decision: claim.decision,
             strata,
             samples,
             axes: [axis(0), axis(1)],
-            random_key: derive(seed, random_path),
-            shuffle_key: derive(seed, &[SHUFFLE_TAG, decision]),
-        }
+            random_key: 0,
+            shuffle_key: 0,
+        };
+        made.reseed(seed);
+        made
+    }
+
+    fn reseed(&mut self, seed: u64) {
+        let decision = self.decision as u64;
+        let random_path: &[u64] = match self.spec.scope {
+            Scope::Decision | Scope::Each => &[RANDOM_TAG, decision],
+            Scope::Image | Scope::Pixel => &[RANDOM_TAG],
+        };
+        self.random_key = derive(seed, random_path);
+        self.shuffle_key = derive(seed, &[SHUFFLE_TAG, decision]);
     }
 
     #[inline]
@@ -239,7 +287,9 @@ impl DecisionSampler {
     /// π(i) for `count` ≤ [`BLOCK`] consecutive indices; what follows them is 0.
     #[inline]
     fn places(&self, first: u32, count: usize, keys: &Keys) -> [u32; BLOCK] {
-        debug_assert!(first as usize + count <= self.samples as usize, "sample {first} + {count} of {}", self.samples);
+        // Also in release: beyond its count Hammersley's x is 1 and strata begin anew.
+        let end = u64::from(first) + count as u64;
+        assert!(end <= u64::from(self.samples), "samples {first} to {end} asked of {}", self.samples);
         let mut places = [0; BLOCK];
         let indices = (first..).zip(&mut places[..count]);
         if self.spec.order == Order::Shuffle {
@@ -401,6 +451,25 @@ mod tests {
     }
 
     #[test]
+    fn a_reseeded_sampler_is_one_made_with_that_seed_and_reads_the_top_of_its_fractions() {
+        let t = tickets();
+        for s in every_legal_spec().into_iter().filter(|s| s.points != Points::Center) {
+            let mut sampler = Sampler::new(s, &t.layout, 20, 1).unwrap();
+            sampler.reseed(2);
+            let fresh = Sampler::new(s, &t.layout, 20, 2).unwrap();
+            let pixel = PixelKey::new(6, 1);
+            for dim in [&t.pixel, &t.lens, &t.light] {
+                let (mut x, mut y) = ([0; 20], [0; 20]);
+                sampler.fractions_2d(pixel, 0, dim, &mut x, &mut y);
+                for (i, (x, y)) in (0..).zip(x.into_iter().zip(y)) {
+                    assert_eq!(fresh.get_2d(pixel, i, dim), [x, y].map(unit_f32), "{s}");
+                }
+            }
+            assert!((0..20).all(|i| sampler.get_1d(pixel, i, &t.pick) == fresh.get_1d(pixel, i, &t.pick)), "{s}");
+        }
+    }
+
+    #[test]
     fn scopes_share_keys_exactly_where_they_say() {
         let t = tickets();
         let same = |scope: Scope, order: &str| {
@@ -436,6 +505,21 @@ mod tests {
         let mut no_pick = SampleLayout::default();
         no_pick.claim_2d(Decision::Pixel);
         assert!(!SamplerSet::from(spec("halton:sheet")).is_random(&no_pick));
+    }
+
+    #[test]
+    fn an_index_beyond_the_count_is_refused_before_and_stops_the_program_after() {
+        let t = tickets();
+        for s in every_legal_spec().into_iter().filter(|s| s.points != Points::Center) {
+            let sampler = Sampler::new(s, &t.layout, 16, 1).unwrap();
+            assert!(sampler.check_index(u64::from(sampler.samples()) - 1).is_ok());
+            for index in [u64::from(sampler.samples()), 1 << 31, u64::MAX] {
+                assert_eq!(sampler.check_index(index).unwrap_err().exit_code(), 2, "{s}");
+            }
+        }
+        let sampler = Sampler::new(spec("hammersley"), &t.layout, 16, 1).unwrap();
+        let beyond = std::panic::catch_unwind(|| sampler.get_2d(PixelKey::new(0, 0), 16, &t.pixel));
+        assert!(beyond.is_err());
     }
 
     #[test]

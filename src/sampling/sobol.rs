@@ -4,6 +4,9 @@
 /// lines that begin with `#`.
 const JOE_KUO: &str = include_str!("new-joe-kuo-6.256.txt");
 
+/// Dimensions that the table gives, van der Corput's first one included.
+pub const DIMENSIONS: u32 = 256;
+
 /// One coordinate of the Sobol' sequence, ready to look up: `x = T₀[i₀] ⊕ T₁[i₁] ⊕ T₂[i₂]` for the bytes of a 24-bit index.
 #[derive(Debug, Clone)]
 pub struct SobolAxis {
@@ -12,7 +15,7 @@ pub struct SobolAxis {
 }
 
 impl SobolAxis {
-    /// Coordinate number `dimension` (0 is van der Corput's), or `None` beyond the table's 256.
+    /// Coordinate number `dimension` (0 is van der Corput's), or `None` beyond the table's [`DIMENSIONS`].
     pub fn new(dimension: u32) -> Option<Self> {
         let columns = columns(dimension)?;
         let mut tables = Box::new([[0u32; 256]; 3]);

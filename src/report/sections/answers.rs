@@ -4,27 +4,37 @@ use crate::sampling::{Decision, Order, Points, Preset};
 
 use super::super::evidence::{Answer, Limit, below};
 use super::super::markdown::{Page, link_to, table_ref};
-use super::super::numbers::{listed, signed_estimate};
+use super::super::numbers::{estimate, listed, p_words, short, signed_estimate};
 use super::super::summarise::{Cell, SamplerSummary, Summary};
-use super::correlation::patterns;
+use super::coupling::{Dependence, SetTests, Tests, pair_words};
 use super::decisions;
-use super::identical::bytes;
-use super::points::star_against_uniform;
+use super::identical::{Identity, bytes};
+use super::neighbours::{NeighbourTests, patterns};
 use super::titles;
 use super::words::{against_one, bias_short, main_scene, name, rmse_ratio, rows, scene_name, times};
 
 /// Lines of the box.
 const MOST_LINES: usize = 8;
 
+/// What was tested once for the whole report.
+pub struct Asked<'a> {
+    /// Of the samplers themselves.
+    pub samplers: &'a Tests,
+    /// Of neighbouring pixels.
+    pub neighbours: &'a NeighbourTests,
+    /// Of means and patterns.
+    pub identity: &'a Identity<'a>,
+}
+
 /// The section.
-pub fn section(summary: &Summary, page: &mut Page) {
+pub fn section(summary: &Summary, asked: &Asked, page: &mut Page) {
     page.heading(2, "Answers");
     let Some(scene) = main_scene(summary).filter(|_| !summary.cells.is_empty()) else {
         page.paragraph("There are no comparisons yet to answer from.");
         return;
     };
     let which = decisions::answer(summary, &link_to(titles::WHICH));
-    let others = [which, identical(summary, scene), helps(summary, scene), hurts(summary)];
+    let others = [which, identical(summary, asked, scene), helps(summary, asked, scene), hurts(summary, asked)];
     let others: Vec<String> = others.into_iter().flatten().collect();
     let mut lines: Vec<String> = Points::ALL.iter().filter_map(|&points| technique(summary, points)).collect();
     lines.truncate(MOST_LINES - others.len());
@@ -72,20 +82,25 @@ fn uniform_line(summary: &Summary, uniform: usize) -> Option<String> {
     let (base, better, others) = beaten_by(summary, scene, uniform)?;
     let right = match unbiased {
         0 => "that there is no bias cannot be claimed in any scene".to_owned(),
-        n => format!("advantage: no bias seen in {n} of {}", super::words::scenes(cells.len())),
+        n => format!(
+            "advantage: no bias seen in {n} of {}, 0 being in the interval of bias²",
+            super::words::scenes(cells.len())
+        ),
     };
     let slow = match better {
         0 => "no other sampler is seen to do better",
         _ => "disadvantage: slow",
     };
     Some(format!(
-        "{right} (in {}: {}); {slow}{}: in {} at {} spp {better} of {others} others have a smaller error ({}). {}",
+        "{right} (in {} {}, {}); {slow}{} ({}): in {} at {} spp {better} of {others} others have a smaller error with the whole interval ({}). {}",
         scene_name(summary, scene),
-        bias_short(cell),
+        estimate(&cell.bias2),
+        table_ref("bias"),
         slope.unwrap_or_default(),
+        table_ref("slopes"),
         scene_name(summary, scene),
         base.spp.asked,
-        link_to(titles::CONVERGENCE),
+        table_ref("against-uniform"),
         rows(&[cell, base])
     ))
 }
@@ -115,7 +130,7 @@ fn gain(summary: &Summary, sampler: usize) -> Option<String> {
         .collect();
     let less = ratios.iter().filter(|(_, ratio)| against_one(ratio) == "less").count();
     let words = match (less == ratios.len(), less) {
-        (true, _) => "advantage: a smaller error than uniform's in every scene",
+        (true, _) => "advantage: a smaller error than uniform's in every scene, each interval below 1",
         (_, 0) => "no advantage over uniform is seen",
         _ => "advantage in some scenes",
     };
@@ -142,7 +157,7 @@ fn gain(summary: &Summary, sampler: usize) -> Option<String> {
 /// The disadvantage of the literal reading.
 fn literal(summary: &Summary, points: Points) -> Option<String> {
     let sheet = summary.preset(points, Preset::Sheet)?;
-    let (_, to) = summary.course_counts()?;
+    let (from, to) = summary.course_counts()?;
     let by = |wanted: Limit| -> Vec<usize> {
         let has = |&scene: &usize| summary.course(scene, sheet).is_some_and(|course| course.limit() == wanted);
         (0..summary.scenes.len()).filter(has).collect()
@@ -152,8 +167,14 @@ fn literal(summary: &Summary, points: Points) -> Option<String> {
         let items: Vec<String> = scenes
             .iter()
             .filter_map(|&scene| {
-                let cell = summary.cell(scene, sheet, to)?;
-                Some(format!("{} ({})", scene_name(summary, scene), bias_short(cell)))
+                let (cell, course) = (summary.cell(scene, sheet, to)?, summary.course(scene, sheet)?);
+                Some(format!(
+                    "{} (RMSE {to} / {from} spp = {}, above {}; {})",
+                    scene_name(summary, scene),
+                    times(&course.rmse_ratio),
+                    short(course.border()),
+                    bias_short(cell)
+                ))
             })
             .collect();
         listed(&items)
@@ -168,41 +189,42 @@ fn literal(summary: &Summary, points: Points) -> Option<String> {
     if !both.is_empty() {
         parts.push(format!("stalls, and is biased, in {}", told(&both)));
     }
-    let (who, link) = (name(summary, sheet), link_to(titles::DECISIONS));
+    let (who, link) = (name(summary, sheet), table_ref("literal"));
     Some(match parts.as_slice() {
         [] => format!("Read literally ({who}) no wrong limit and no stall is seen at {to} spp ({link})."),
-        parts => format!("Disadvantage: read literally ({who}) it {} at {to} spp ({link}).", parts.join(" and ")),
+        parts => format!("Disadvantage: read literally ({who}) it {} ({link}).", parts.join(" and ")),
     })
 }
 
 /// Are the outputs identical?
-fn identical(summary: &Summary, scene: usize) -> Option<String> {
+fn identical(summary: &Summary, asked: &Asked, scene: usize) -> Option<String> {
     let most = summary.most_spp()?;
     let found = bytes(summary, scene, most);
     if found.images < 2 {
         return None;
     }
     let words = match found.distinct {
-        n if n == found.images => "no, all differ".to_owned(),
-        n => format!("{n} different ones among them"),
+        n if n == found.images => "no two are the same".to_owned(),
+        n => format!("{n} are different ones"),
     };
-    let wrong = (0..summary.samplers.len())
-        .filter(|&i| summary.course(scene, i).is_some_and(|course| course.limit() == Limit::Wrong))
-        .count();
-    let why = match wrong {
-        0 => "by their noise; no wrong limit is seen".to_owned(),
-        n => format!("by their noise, and {n} of them by a bias that stays"),
-    };
+    let means = asked.identity.truth_words(summary, scene).map_or(String::new(), |words| format!(". Yet {words}"));
     Some(format!(
-        "**Identical?** {} samplers' images of {} at {most} spp: {words} (pixel digests), {why} ({}).",
+        "**Identical?** By their bytes, of {} samplers' images of {} at {most} spp {words}{means} ({}, against uniform's {}).",
         found.images,
         scene_name(summary, scene),
-        link_to(titles::IDENTICAL)
+        table_ref("means"),
+        table_ref("same")
     ))
 }
 
+/// The variance of a set's mean against independent points', with its test.
+fn set_words(summary: &Summary, tests: &SetTests) -> Option<String> {
+    let ratio = tests.within.variances[0]?.ratio;
+    Some(format!("{} {} ({})", name(summary, tests.sampler), times(&ratio), p_words(tests.variance_p[0])))
+}
+
 /// Correlation within a set helps.
-fn helps(summary: &Summary, scene: usize) -> Option<String> {
+fn helps(summary: &Summary, asked: &Asked, scene: usize) -> Option<String> {
     let (uniform, spp) = (summary.uniform()?, summary.middle_spp()?);
     let base = summary.cell(scene, uniform, spp)?;
     // Points that keep apart in each decision by itself: with decisions in step or joint, more than that is at work.
@@ -215,38 +237,69 @@ fn helps(summary: &Summary, scene: usize) -> Option<String> {
         .filter(|&i| i != uniform && is_shuffled(i))
         .filter_map(|i| Some((i, rmse_ratio(summary.cell(scene, i, spp)?, base)?)))
         .min_by(|a, b| a.1.value.total_cmp(&b.1.value))?;
-    let star = star_against_uniform(summary, best.0);
-    let even = star.map(|(ratio, n, id)| {
-        format!("; the discrepancy of its {n} points is {} of uniform's (row {id})", times(&ratio))
-    });
-    let ids = rows(&[summary.cell(scene, best.0, spp)?, base]);
+    let of = |wanted: Dependence| asked.samplers.sets.iter().filter(|t| t.dependence() == wanted).count();
+    let told = |sampler: usize| asked.samplers.set(sampler).and_then(|tests| set_words(summary, tests));
+    let told: Vec<String> = [uniform, best.0].into_iter().filter_map(told).collect();
     let words = match against_one(&best.1) {
-        "less" => "it helps",
-        "more" => "it does not help here",
-        _ => "whether it helps cannot be told",
+        "less" => "It helps",
+        "more" => "It does not help here",
+        _ => "Whether it helps cannot be told",
     };
     Some(format!(
-        "**Independent or correlated?** Only uniform's are independent. Within a set, points that fill the square evenly are correlated: {words}. Smallest RMSE over uniform's in {} at \
-         {spp} spp, of the sets that each decision reads in an order of its own: {} {} {ids}{} ({}).",
-        scene_name(summary, scene),
+        "**Independent or correlated?** Within a set the points of {} of {} samplers are negatively dependent (not told apart from independent: {}). Variance of a mean of xy over that of independent points: {} ({}). {words}: the RMSE of {} in {} at {spp} spp \
+         is {} of uniform's ({}). {}",
+        of(Dependence::Negative),
+        asked.samplers.sets.len(),
+        of(Dependence::NotSeen),
+        listed(&told),
+        table_ref("dependence"),
         name(summary, best.0),
+        scene_name(summary, scene),
         times(&best.1),
-        even.unwrap_or_default(),
-        link_to(titles::WITHIN)
+        table_ref("against-uniform"),
+        rows(&[summary.cell(scene, best.0, spp)?, base])
     ))
 }
 
 /// Correlation between decisions and between pixels hurts.
-fn hurts(summary: &Summary) -> Option<String> {
+fn hurts(summary: &Summary, asked: &Asked) -> Option<String> {
+    let parts: Vec<String> =
+        [between_decisions(summary, asked), between_pixels(summary, asked)].into_iter().flatten().collect();
+    (!parts.is_empty()).then(|| format!("**Does correlation hurt?** {}.", parts.join("; ")))
+}
+
+/// The worst literal reading: how its decisions are coupled, and what that costs.
+fn between_decisions(summary: &Summary, asked: &Asked) -> Option<String> {
+    let most = summary.most_spp()?;
     let worst = (0..summary.scenes.len())
         .filter(|&scene| summary.scenes[scene].decisions.len() > 1)
         .flat_map(|scene| summary.literal_pairs().into_iter().map(move |pair| (scene, pair)))
         .filter_map(|(scene, (sheet, best))| {
-            let most = summary.most_spp()?;
             let ratio = rmse_ratio(summary.cell(scene, sheet, most)?, summary.cell(scene, best, most)?)?;
             Some((scene, sheet, best, ratio))
         })
         .max_by(|a, b| a.3.value.total_cmp(&b.3.value));
+    let (scene, sheet, best, ratio) = worst?;
+    let ids = rows(&[summary.cell(scene, sheet, most)?, summary.cell(scene, best, most)?]);
+    let words = match against_one(&ratio) {
+        "more" => "Between decisions it can hurt",
+        "less" => "Between decisions it does not hurt here",
+        _ => "Whether it hurts between decisions cannot be told",
+    };
+    let coupled = asked.samplers.pair(sheet).and_then(pair_words);
+    let coupled = coupled.map_or(String::new(), |words| format!(" (its decisions: {words}, {})", table_ref("pairs")));
+    Some(format!(
+        "{words}: in the worst case, {} at {most} spp, the RMSE of {}{coupled} is {} times that of {} ({}) {ids}",
+        scene_name(summary, scene),
+        name(summary, sheet),
+        times(&ratio),
+        name(summary, best),
+        table_ref("literal")
+    ))
+}
+
+/// The pattern that neighbours share most.
+fn between_pixels(summary: &Summary, asked: &Asked) -> Option<String> {
     let alike = (0..summary.scenes.len())
         .flat_map(|scene| patterns(summary, scene).into_iter().map(move |p| (scene, p)))
         // Decisions in step bias an image, which makes neighbours alike, too: the pattern alone is shown by the others.
@@ -254,34 +307,15 @@ fn hurts(summary: &Summary) -> Option<String> {
         .filter(|(_, p)| summary.samplers[p.sampler].spec().is_some_and(|spec| spec.order != Order::Step))
         .filter_map(|(scene, p)| Some((scene, p.cell, p.cell.error_autocorrelation?)))
         .max_by(|a, b| a.2.value.total_cmp(&b.2.value));
-    let mut parts = Vec::new();
-    if let Some((scene, sheet, best, ratio)) = worst {
-        let most = summary.most_spp()?;
-        let ids = rows(&[summary.cell(scene, sheet, most)?, summary.cell(scene, best, most)?]);
-        let words = match against_one(&ratio) {
-            "more" => "Between decisions it can hurt",
-            "less" => "Between decisions it does not hurt here",
-            _ => "Whether it hurts between decisions cannot be told",
-        };
-        parts.push(format!(
-            "{words}: in the worst case, {} at {} spp, the RMSE of {} is {} times that of {} {ids} ({})",
-            scene_name(summary, scene),
-            summary.most_spp()?,
-            name(summary, sheet),
-            times(&ratio),
-            name(summary, best),
-            link_to(titles::DECISIONS)
-        ));
-    }
-    if let Some((scene, cell, rho)) = alike {
-        parts.push(format!(
-            "between pixels it turns noise into structure: {} in {} has ρ = {} {} ({})",
-            name(summary, cell.sampler),
-            scene_name(summary, scene),
-            signed_estimate(&rho),
-            rows(&[cell]),
-            link_to(titles::PIXELS)
-        ));
-    }
-    (!parts.is_empty()).then(|| format!("**Does correlation hurt?** {}.", parts.join("; ")))
+    let (scene, cell, rho) = alike?;
+    let p = asked.neighbours.of(scene, cell.sampler).and_then(|test| test.p);
+    Some(format!(
+        "between pixels it turns noise into structure: {} in {} has ρ = {}, {} ({}) {}",
+        name(summary, cell.sampler),
+        scene_name(summary, scene),
+        signed_estimate(&rho),
+        p_words(p),
+        table_ref("neighbours"),
+        rows(&[cell])
+    ))
 }

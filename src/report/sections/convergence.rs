@@ -45,8 +45,9 @@ fn slope_estimate(fit: &crate::stats::SlopeFit) -> Estimate {
 pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
     page.heading(2, titles::CONVERGENCE);
     let caption = format!(
-        "RMSE in W/(m² sr) against samples per pixel taken, a panel a scene; {} with 95 % bands; thin lines: slopes −1/2 and −1; dotted: the reference's own noise{}. \
+        "RMSE in W/(m² sr) against samples per pixel taken, a panel a scene: {}; {} with 95 % bands; thin lines: slopes −1/2 and −1; dotted: the reference's own noise{}. \
          The numbers are in {}.",
+        scenes_by_size(summary),
         counted(summary.about.experiment.replicates as usize, "replicate", "replicates"),
         if reference::mark_words(summary).is_some() { "; pale markers: reference-limited" } else { "" },
         table_ref("rmse")
@@ -87,6 +88,12 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
     if let Some(words) = reference::mark_words(summary) {
         page.paragraph(&words);
     }
+}
+
+/// `` `a01` (80x45 pixels) and `cornell` (60x60 pixels)``.
+fn scenes_by_size(summary: &Summary) -> String {
+    let size = |scene: usize| format!("{} ({} pixels)", scene_name(summary, scene), summary.scenes[scene].size);
+    listed(&(0..summary.scenes.len()).map(size).collect::<Vec<_>>())
 }
 
 /// Which slopes are told apart from −1/2.
@@ -149,8 +156,9 @@ pub fn bias_and_variance(summary: &Summary, figures: &Figures, page: &mut Page) 
     page.heading(2, titles::BIAS);
     let Some(most) = summary.most_spp() else { return };
     let caption = format!(
-        "Bias² and variance at {most} spp in (W/(m² sr))², a group a scene, {} with 95 % intervals; what reaches the left edge is not told apart from 0. What each does \
+        "Bias² and variance at {most} spp in (W/(m² sr))², a group a scene: {}; {} with 95 % intervals; what reaches the left edge is not told apart from 0. What each does \
          as samples are added is in {}; the numbers are in {}.",
+        scenes_by_size(summary),
         counted(summary.about.experiment.replicates as usize, "replicate", "replicates"),
         link_to(titles::DECISIONS),
         table_ref("bias")

@@ -2,7 +2,7 @@
 
 use super::super::evidence::{Answer, Limit};
 use super::super::summarise::Summary;
-use super::correlation::structure;
+use super::neighbours::structure;
 
 /// What is wrong, in words; empty where nothing is seen and the construction promises the right image.
 pub fn flaws(summary: &Summary, scene: usize, sampler: usize) -> Vec<&'static str> {

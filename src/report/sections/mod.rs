@@ -17,14 +17,18 @@
 mod answers;
 mod budgets;
 mod convergence;
-mod correlation;
+mod coupling;
 mod decisions;
 mod failures;
 mod flaws;
+mod gallery;
 mod identical;
+mod in_step;
+mod neighbours;
 mod opening;
 mod pictures;
 mod points;
+mod predicates;
 mod reference;
 mod scenes;
 mod shortcut;
@@ -32,7 +36,9 @@ mod speed;
 mod stability;
 mod words;
 
+use super::gallery::Failure;
 use super::markdown::Page;
+use super::pairing::{self, Paired};
 use super::summarise::Summary;
 use super::write::{FigureState, Figures};
 
@@ -49,17 +55,50 @@ mod titles {
     pub const PICTURES: &str = "Pictures at equal samples and at equal time";
     pub const SPEED: &str = "Speed against accuracy";
     pub const FAILURES: &str = "Where methods fail";
+    pub const GALLERY: &str = "A gallery of failures";
     pub const STABILITY: &str = "Stability";
     pub const SHORTCUT: &str = "The sheet's shortcut";
     pub const TABLE: &str = "Advantages and disadvantages";
     pub const LIMITS: &str = "Limits";
 }
 
+/// What a report asks of the samplers themselves, beyond the rows: a function of the experiment's samplers and seed alone.
+pub struct Measurements {
+    /// Within sets and between decisions.
+    tests: coupling::Tests,
+    /// Two decisions and an integrand that needs both, by sampler.
+    paired: Vec<(usize, Vec<Paired>)>,
+    /// Failures of methods.
+    gallery: Vec<Failure>,
+}
+
+impl Measurements {
+    /// Measures everything: less than a second.
+    pub fn of(summary: &Summary) -> Self {
+        let seed = summary.about.experiment.seed;
+        let paired = |i: usize| Some((i, pairing::measure(&summary.samplers[i].spec()?, seed)?));
+        Self {
+            tests: coupling::Tests::of(summary),
+            paired: (0..summary.samplers.len()).filter_map(paired).collect(),
+            gallery: super::gallery::measure(seed),
+        }
+    }
+}
+
 /// `report.md`.
 pub fn report(summary: &Summary, figures: &Figures) -> String {
+    report_with(summary, figures, &Measurements::of(summary))
+}
+
+/// [`report`] with measurements that were made before, for several reports of the same samplers and seed.
+pub fn report_with(summary: &Summary, figures: &Figures, measured: &Measurements) -> String {
     let mut page = Page::new();
     opening::title(summary, &mut page);
-    answers::section(summary, &mut page);
+    let tests = &measured.tests;
+    let neighbours = neighbours::NeighbourTests::of_all(summary);
+    let identity = identical::Identity::of(summary);
+    let asked = answers::Asked { samplers: tests, neighbours: &neighbours, identity: &identity };
+    answers::section(summary, &asked, &mut page);
     page.contents();
     opening::what_was_run(summary, &mut page);
     opening::how_to_read(summary, &mut page);
@@ -68,19 +107,21 @@ pub fn report(summary: &Summary, figures: &Figures) -> String {
     points::figure_2(summary, figures, &mut page);
     points::discrepancy(summary, figures, &mut page);
     page.heading(2, "Independent or correlated");
-    points::within(summary, &mut page);
-    correlation::between_decisions(summary, &mut page);
-    correlation::between_pixels(summary, &mut page);
+    points::within(summary, tests, &mut page);
+    in_step::between_decisions(summary, measured, &mut page);
+    neighbours::between_pixels(summary, &neighbours, &mut page);
     decisions::section(summary, figures, &mut page);
-    identical::section(summary, &mut page);
+    identical::section(summary, &identity, &mut page);
     convergence::section(summary, figures, &mut page);
     convergence::bias_and_variance(summary, figures, &mut page);
     pictures::strips(summary, figures, &mut page);
     speed::section(summary, figures, &mut page);
     shortcut::section(summary, &mut page);
+    page.heading(2, titles::FAILURES);
+    gallery::section(&measured.gallery, figures, &mut page);
     failures::section(summary, &mut page);
     stability::section(summary, figures, &mut page);
-    failures::table(summary, &mut page);
+    predicates::section(summary, tests, &neighbours, &mut page);
     failures::limits(summary, &mut page);
     page.finish()
 }

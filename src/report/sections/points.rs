@@ -1,14 +1,15 @@
 //! The point sets themselves: the sheet's Figure 2, discrepancy, and how even each set is.
 
 use crate::sampling::Points;
-use crate::stats::{Estimate, IntervalKind, SlopeFit, slope_with_interval};
+use crate::stats::{Estimate, IntervalKind, LACK_OF_FIT_LEVEL, LEAST_RESIDUAL, SlopeFit, slope_with_interval};
 
 use super::super::charts::FIGURE_2_POINTS;
 use super::super::evidence::{Answer, below, ratio};
-use super::super::markdown::Page;
-use super::super::numbers::{counted, estimate, listed, signed_estimate};
+use super::super::markdown::{Page, table_ref};
+use super::super::numbers::{counted, estimate, listed, p_value, percent, signed_estimate};
 use super::super::summarise::{PointSet, SLOPE_POINTS, Summary};
 use super::super::write::Figures;
+use super::coupling::{self, Tests};
 use super::words::{name, ratio_cell, row};
 use super::{show, tabulate, titles};
 
@@ -50,6 +51,15 @@ fn star_slope(summary: &Summary, sampler: usize) -> Option<SlopeFit> {
     slope_with_interval(&ns, &squares, summary.about.experiment.seed)
 }
 
+/// Whether one slope tells how the discrepancy falls.
+fn line_words(fit: &SlopeFit) -> String {
+    match fit.line_p {
+        None => "cannot tell".to_owned(),
+        Some(_) if fit.is_no_power_law() => format!("no: {} off", percent(fit.largest_residual)),
+        Some(_) => "not told apart from one".to_owned(),
+    }
+}
+
 /// A slope as an estimate.
 fn slope_estimate(fit: &SlopeFit) -> Estimate {
     Estimate { value: fit.slope, ci95: fit.ci95 }
@@ -81,7 +91,7 @@ pub fn discrepancy(summary: &Summary, figures: &Figures, page: &mut Page) {
     };
     let mut head: Vec<String> = vec!["sampler".to_owned()];
     head.extend(shown.iter().map(|n| format!("D*, n = {n}")));
-    head.extend(["slope in n".to_owned(), "points of the fit".to_owned()]);
+    head.extend(["slope in n", "p of a line", "one line?", "points of the fit"].map(str::to_owned));
     let line = |sampler: usize| {
         let sets = star_sets(summary, sampler);
         let mut cells = vec![name(summary, sampler)];
@@ -94,6 +104,8 @@ pub fn discrepancy(summary: &Summary, figures: &Figures, page: &mut Page) {
             let star = if fit.interval == IntervalKind::Residuals { "*" } else { "" };
             signed_estimate(&slope_estimate(fit)) + star
         }));
+        cells.push(p_value(fit.as_ref().and_then(|fit| fit.line_p)));
+        cells.push(fit.as_ref().map_or("–".to_owned(), line_words));
         cells.push(fit.map_or("0".to_owned(), |fit| fit.points.to_string()));
         cells
     };
@@ -104,8 +116,19 @@ pub fn discrepancy(summary: &Summary, figures: &Figures, page: &mut Page) {
     let with_sets = (0..summary.samplers.len()).filter(|&i| !summary.samplers[i].is_mixed());
     tabulate(page, "discrepancy", &caption, &head, &with_sets.map(line).collect::<Vec<_>>());
     page.paragraph(&format!(
-        "The slope is that of the root mean square over sets, powers of two from {SLOPE_POINTS}; independent points have −0.5."
+        "The slope is that of the root mean square over sets, powers of two from {SLOPE_POINTS}; independent points have −0.5. p of a line: lack-of-fit test over sets; *no* where p is below {} and a point lies more than {} off the line. {}{}",
+        percent(LACK_OF_FIT_LEVEL),
+        percent(LEAST_RESIDUAL),
+        bent_words(summary),
+        "D* of nets falls like log n / n at best, which is no power of n: such a slope holds for these n and not beyond.",
     ));
+}
+
+/// Whose discrepancy one slope does not tell.
+fn bent_words(summary: &Summary) -> String {
+    let bent = |&i: &usize| star_slope(summary, i).is_some_and(|fit| fit.is_no_power_law());
+    let bent: Vec<String> = (0..summary.samplers.len()).filter(bent).map(|i| name(summary, i)).collect();
+    if bent.is_empty() { String::new() } else { format!("No line, so no one slope: {}. ", listed(&bent)) }
 }
 
 /// How a sampler's D* at the largest n compares with uniform's; the row behind it.
@@ -120,18 +143,19 @@ pub fn star_against_uniform(summary: &Summary, sampler: usize) -> Option<(Estima
 }
 
 /// Evenness within a set: correlation that helps.
-pub fn within(summary: &Summary, page: &mut Page) {
+pub fn within(summary: &Summary, tests: &Tests, page: &mut Page) {
     page.heading(3, titles::WITHIN);
+    coupling::within(summary, tests, page);
     let compared: Vec<(usize, Estimate, u32, String)> = (0..summary.samplers.len())
         .filter_map(|sampler| star_against_uniform(summary, sampler).map(|(r, n, id)| (sampler, r, n, id)))
         .collect();
     let Some(n) = compared.first().map(|(_, _, n, _)| *n) else {
-        page.paragraph("Nothing can be said of the points within a set: no point sets of uniform sampling and another were measured.");
+        page.paragraph("Nothing is said of evenness: no point sets of uniform sampling and another were measured.");
         return;
     };
     let others = || compared.iter().filter(|(sampler, ..)| Some(*sampler) != summary.uniform());
     if others().next().is_none() {
-        page.paragraph("Nothing can be said of the points within a set: no point sets of another sampler than uniform were measured.");
+        page.paragraph("Nothing is said of evenness: no point sets of another sampler than uniform were measured.");
         return;
     }
     let even: Vec<String> = others()
@@ -145,8 +169,9 @@ pub fn within(summary: &Summary, page: &mut Page) {
     let mut sentences = Vec::new();
     if !even.is_empty() {
         sentences.push(format!(
-            "At n = {n} the points of {} are more even than independent ones, by their discrepancy: so they are correlated within the set.",
-            listed(&even)
+            "By their discrepancy, too, the n = {n} points of {} are more even than independent ones: each ratio in {} lies below 1 with its whole interval.",
+            listed(&even),
+            table_ref("evenness")
         ));
     }
     if !not.is_empty() {

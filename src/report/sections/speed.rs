@@ -33,7 +33,7 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
     for scene in 0..summary.scenes.len() {
         let scene_file = &summary.scenes[scene].name;
         let caption = format!(
-            "Speed against accuracy in `{scene_file}`, {} pixels: median seconds an image against RMSE in W/(m² sr), one mark a sampler and count, those on the front by name; bars: range of \
+            "Speed against accuracy in `{scene_file}`, {} pixels: median seconds an image against RMSE in W/(m² sr), one mark a sampler and count, those on the front with their samples per pixel; bars: range of \
              the seconds and 95 % interval of the RMSE, {}.",
             summary.scenes[scene].size,
             counted(summary.about.experiment.replicates as usize, "replicate", "replicates")

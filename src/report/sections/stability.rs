@@ -24,18 +24,22 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
         return;
     }
     let stretch = Stretch::of(summary);
-    page.paragraph(&format!(
-        "What should make no difference, held against {} spp. {} are judged below. A verdict asks for more than a 95 % interval: each is *stretched* (on a logarithmic scale) by Student's factor for \
-         all of them together, {} at {} degrees of freedom, so that a difference which is not there is called anywhere with a chance of at most {}. \
-         *Worse*: above what is promised by more than {} with the whole stretched interval; *stable*: above it by at most {}, likewise; all else is *cannot tell*.",
-        asked.spp,
-        counted(stretch.comparisons, "ratio of errors", "ratios of errors"),
-        short(stretch.factor(stretch.freedom)),
-        stretch.freedom,
-        percent(FALSE_ALARM),
-        percent(LEAST - 1.0),
-        percent(MARGIN - 1.0),
-    ));
+    page.paragraph(&format!("What should make no difference, held against {} spp:", asked.spp));
+    page.bullets(&[
+        format!(
+            "{} are judged below, by *stretched* intervals: wider than 95 % ones by Student's factor for all of them together, {} at {} degrees of freedom, on a logarithmic scale. A difference that is not there is called anywhere \
+             with a chance of at most {}.",
+            counted(stretch.comparisons, "ratio of errors", "ratios of errors"),
+            short(stretch.factor(stretch.freedom)),
+            stretch.freedom,
+            percent(FALSE_ALARM),
+        ),
+        format!(
+            "*Worse*: more than {} above what is promised, with the whole stretched interval. *Stable*: at most {} above it, likewise. All else: *cannot tell*.",
+            percent(LEAST - 1.0),
+            percent(MARGIN - 1.0),
+        ),
+    ]);
     let scenes: Vec<String> = by_scene(summary).iter().map(|(scene, _)| scene_name(summary, *scene)).collect();
     let caption = format!(
         "RMSE over what is promised of it (no unit), at other counts and in two passes, in {}; bars: stretched intervals, {}; dashed: as promised. Against one pass of {} spp, \
@@ -219,9 +223,8 @@ fn replicates(summary: &Summary, page: &mut Page) {
         return;
     }
     page.paragraph(&format!(
-        "How much the RMSE of {n} replicates varies: its coefficient of variation (standard deviation over mean), which does not grow with their number as a range does, with the 95 % interval of a normal \
-         standard deviation. *Narrow*: at most {} with the whole interval; *wide*: more with the whole interval. Each verdict stands by itself: one in twenty may err. One more replicate is worse than \
-         the worst of them with probability 1/{}.",
+        "How much the RMSE of {n} replicates varies: standard deviation over mean (coefficient of variation), with the 95 % interval of a normal one. *Narrow*: at most {}, *wide*: more, each with the whole interval, one in twenty of which may err. \
+         One more replicate is worse than the worst of these with probability 1/{}.",
         percent(WIDE),
         n + 1
     ));
@@ -292,15 +295,16 @@ fn scaled(subject: &Subject) -> impl Iterator<Item = (i8, &Cell)> {
 
 fn scales(summary: &Summary, page: &mut Page) {
     page.heading(3, "In another unit of length");
-    page.paragraph(&format!(
-        "The scene with all lengths (mesh, camera, lens, focus) multiplied, the same seeds: radiance does not depend on the unit of length, so nothing but roundings may change. A rounding may \
-         move a ray across an edge, and then a pixel jumps (by more than {} of the mean radiance). *Unchanged beyond rounding*: in no replicate do more than {} of the pixels jump, and none differs by a root mean \
-         square of more than {} of the mean radiance; *changed*: more than that in one replicate at least. Of all replicates the worst is shown. Ratios are paired, so the reference's noise, common \
-         to both, is not in their intervals; one image each has none, unless its reference is exact.",
-        short(JUMP),
-        percent(JUMPING),
-        percent(ROUNDING)
-    ));
+    page.paragraph("All lengths of the scene (mesh, camera, lens, focus) multiplied, the same seeds. Radiance has no unit of length, so nothing but roundings may change.");
+    page.bullets(&[
+        format!("A pixel *jumps* where a rounding moves a ray across an edge: by more than {} of the mean radiance.", short(JUMP)),
+        format!(
+            "*Unchanged beyond rounding*: in every replicate at most {} of the pixels jump, and the others differ by a root mean square of at most {} of the mean radiance. *Changed*: more than that in one replicate.",
+            percent(JUMPING),
+            percent(ROUNDING)
+        ),
+        "The worst replicate is shown. Ratios are paired, so the reference's noise, common to both, is not in their intervals.".to_owned(),
+    ]);
     let mut lines = Vec::new();
     for subject in &summary.stability {
         for (power, cell) in scaled(subject) {
@@ -383,14 +387,18 @@ fn passes(summary: &Summary, stretch: &Stretch, page: &mut Page) {
     }
     page.heading(3, "Two passes");
     page.paragraph(&format!(
-        "The driver of the sheet's framework makes a first pass of 1 sample and a second of {}, in which the samplers begin anew: a deterministic sequence repeats its first point, a randomised one \
-         draws another randomisation, and a set made for {} points is replaced by one for {}. The mean, weighted by the samples taken, against one pass of {}; promised is what the samples taken are worth, as above. Ratios are paired, so the reference's noise, common to both, \
-         is not in their intervals (of one image each it is all that they hold).",
-        asked.spp - 1,
-        asked.spp,
-        asked.spp - 1,
-        asked.spp
+        "The driver of the sheet's framework makes a first pass of 1 sample and a second of {}, and its samplers begin anew in each:",
+        asked.spp - 1
     ));
+    page.bullets(&[
+        format!(
+            "a deterministic sequence repeats its first point; a randomised one draws another randomisation; a set made for {} points is replaced by one for {}.",
+            asked.spp,
+            asked.spp - 1
+        ),
+        format!("The mean, weighted by the samples taken, is held against one pass of {}; promised is what the samples taken are worth.", asked.spp),
+        "Ratios are paired, so the reference's noise, common to both, is not in their intervals.".to_owned(),
+    ]);
     let lines: Vec<Vec<String>> = summary
         .stability
         .iter()
@@ -432,8 +440,10 @@ fn passes(summary: &Summary, stretch: &Stretch, page: &mut Page) {
         level(summary)
     );
     tabulate_folded(page, "passes", "Scene by scene, sampler by sampler", &caption, &head, &lines);
-    let items: Vec<String> =
-        by_scene(summary).iter().map(|(scene, subjects)| pass_sentence(summary, stretch, *scene, subjects)).collect();
+    let items: Vec<String> = by_scene(summary)
+        .iter()
+        .flat_map(|(scene, subjects)| pass_sentences(summary, stretch, *scene, subjects))
+        .collect();
     page.bullets(&items);
 }
 
@@ -450,7 +460,7 @@ fn pass_word(verdict: Verdict) -> &'static str {
     }
 }
 
-fn pass_sentence(summary: &Summary, stretch: &Stretch, scene: usize, subjects: &[&Subject]) -> String {
+fn pass_sentences(summary: &Summary, stretch: &Stretch, scene: usize, subjects: &[&Subject]) -> Vec<String> {
     let groups: Vec<(String, Vec<String>)> = [Verdict::Worse, Verdict::Stable, Verdict::CannotTell]
         .into_iter()
         .map(|verdict| {
@@ -467,5 +477,5 @@ fn pass_sentence(summary: &Summary, stretch: &Stretch, scene: usize, subjects: &
             (format!("{}{by}", pass_word(verdict)), members.collect())
         })
         .collect();
-    told(&scene_name(summary, scene), &groups)
+    told_in_items(&scene_name(summary, scene), &groups)
 }

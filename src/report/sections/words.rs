@@ -70,6 +70,22 @@ pub fn bias_words(cell: &Cell, mean: Option<f64>) -> String {
     }
 }
 
+/// The same as a share, where bias² itself stands in another table: of the MSE, or at most of the mean radiance.
+pub fn bias_share_words(cell: &Cell, mean: Option<f64>) -> String {
+    let share = cell.bias_share().map_or("–".to_owned(), |share| percent(share.clamp(0.0, 1.0)));
+    match is_biased(&cell.bias2) {
+        Answer::Yes => format!("bias² is {share} of the MSE"),
+        Answer::CannotTell => format!("perhaps a bias: {share} of the MSE"),
+        Answer::No => {
+            let bound = cell.bias2.ci95.map_or(0.0, |[_, high]| high.max(0.0).sqrt());
+            let bound = mean.filter(|mean| *mean > 0.0).map(|mean| percent(bound / mean));
+            let bound = bound
+                .map_or(String::new(), |bound| format!(": at most {bound} of the mean radiance, root mean square"));
+            format!("no bias seen{bound}")
+        }
+    }
+}
+
 /// What bias² says.
 pub fn bias_short(cell: &Cell) -> String {
     let value = estimate(&cell.bias2);
