@@ -56,6 +56,21 @@ fn statistics() {
     run_group("failures: statistics");
 }
 
+#[test]
+fn lights() {
+    run_group("failures: lights");
+}
+
+#[test]
+fn camera() {
+    run_group("failures: camera");
+}
+
+#[test]
+fn metrics() {
+    run_group("failures: metrics");
+}
+
 /// A row without a check is a failure that nobody would notice.
 #[test]
 fn every_row_of_the_catalogue_has_a_check() {

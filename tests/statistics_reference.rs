@@ -4,9 +4,11 @@
 use sampler_lab::stats::discrepancy::{
     L2Kind, Points, Side, Star, l2_root, l2_squared, min_toroidal_distance, star, star_2d, t_value,
 };
+use sampler_lab::stats::flip::{DEFAULT_PPD, Seen};
 use sampler_lab::stats::hypothesis::{benjamini_hochberg, chi2_upper_tail, holm, sidak, welch};
 use sampler_lab::stats::image_error::{bias, mae, max_abs, mse, mse_unbiased, rel_mse, smape};
 use sampler_lab::stats::moments::{Moments, student_t_quantile};
+use sampler_lab::stats::spectrum::{Spectrum, expected_of_jittered, power_at};
 use serde_json::Value;
 
 fn reference(name: &str) -> Value {
@@ -112,6 +114,14 @@ fn image_metrics_meet_the_reference() {
         ] {
             assert_close(ours, &value(name), 1e-12, name);
         }
+        let width = list(&case["a"])[0].as_array().expect("a row").len();
+        let seen = |flat: &[f64]| {
+            // The numbers are sRGB code values as shares of the largest.
+            let decoded = |v: f64| if v <= 0.04045 { v / 12.92 } else { libm::pow((v + 0.055) / 1.055, 2.4) };
+            let pixel = |p: usize| [flat[3 * p], flat[3 * p + 1], flat[3 * p + 2]].map(decoded);
+            Seen::new(width, flat.len() / 3 / width, DEFAULT_PPD, pixel)
+        };
+        assert_close(seen(&a).flip(&seen(&b)).mean, &value("FLIP_mean"), 1e-4, "FLIP");
     }
 }
 
@@ -197,6 +207,10 @@ fn small_sets_meet_their_exact_discrepancies() {
         let truth = number(&case["values"]["star"]["value"]);
         assert!((found.value - truth).abs() <= 1e-14, "{name} star: {} against {truth}", found.value);
         assert_certified(&points, &found, name);
+        // The reference's own box, which may be another one with the same gap.
+        let theirs = &case["values"]["star"]["attained_at"];
+        let side = if theirs["box"] == "open" { Side::Open } else { Side::Closed };
+        assert_certified(&points, &Star { value: truth, corner: numbers(&theirs["corner"]), side }, name);
         let t = case["values"]["t_base2"].as_u64();
         assert_eq!(t_value(&points).map(u64::from), t, "{name} t");
         let distance = &case["values"]["min_toroidal_distance"];
@@ -265,5 +279,58 @@ fn stored_hammersley_values_are_those_of_the_closed_forms() {
             let (ours, truth) = (l2_squared(&points, kind).expect("above resolution"), number(&row[key]["value"]));
             assert!((ours - truth).abs() <= 1e-12 * truth, "{key} at {}: {ours:e} against {truth:e}", row["m"]);
         }
+    }
+}
+
+/// A set of `discrepancy.json` by name.
+fn stored_set(name: &str) -> Points {
+    let reference = reference("discrepancy.json");
+    let case = list(&reference["cases"]).iter().find(|case| case["name"] == name).expect("a stored set");
+    Points::new(2, list(&case["points_f64"]).iter().flat_map(numbers).collect()).expect("valid")
+}
+
+/// The tolerance of the reference's README: 1e-12 n.
+#[test]
+fn powers_at_integer_frequencies_meet_the_reference() {
+    let reference = reference("spectrum.json");
+    for case in list(&reference["cases"]) {
+        let name = case["set"].as_str().expect("a name");
+        let points = stored_set(name.split(' ').next().expect("a word"));
+        assert_eq!(points.n() as u64, case["n"].as_u64().expect("a count"), "{name}");
+        let spectrum = Spectrum::of(&points, 64);
+        for power in list(&case["P"]) {
+            let nu = [0, 1].map(|k| i32::try_from(power["nu"][k].as_i64().expect("whole")).expect("small"));
+            let truth = number(&power["value"]);
+            let bound = 1e-12 * points.n() as f64;
+            let among_all = spectrum.at(nu).expect("in reach");
+            for ours in [power_at(&points, &nu), among_all] {
+                assert!((ours - truth).abs() <= bound, "{name} P{nu:?}: {ours} against {truth}");
+            }
+        }
+    }
+}
+
+/// The closed form to the digits of the file, and what was simulated there within six of its standard errors.
+#[test]
+fn expected_powers_of_jittered_sets_meet_the_reference() {
+    for row in list(&reference("spectrum.json")["jittered_8x8_expectation"]) {
+        let nu = [0, 1].map(|k| i32::try_from(row["nu"][k].as_i64().expect("whole")).expect("small"));
+        let (ours, truth) = (expected_of_jittered(8, nu), number(&row["expected"]));
+        assert!((ours - truth).abs() <= 1e-14, "{nu:?}: {ours} against {truth}");
+        assert!(number(&row["z"]).abs() < 6.0);
+        assert!((number(&row["simulated"]) - ours).abs() < 0.05, "{nu:?}");
+    }
+}
+
+/// `hammersley_closed_form.json`: cell centres of k × k cells.
+#[test]
+fn grids_meet_the_stored_formula() {
+    assert_eq!(reference("hammersley_closed_form.json")["formulas"]["grid_kxk_centres_star"], "1/k - 1/(4 k^2)");
+    for k in [1_u32, 2, 4, 17, 128] {
+        let side = f64::from(k);
+        let centre = |i: u32| (f64::from(i) + 0.5) / side;
+        let points: Vec<[f64; 2]> = (0..k * k).map(|i| [centre(i % k), centre(i / k)]).collect();
+        let value = star_2d(&Points::new_2d(&points).expect("valid")).value;
+        assert!((value - (1.0 / side - 0.25 / (side * side))).abs() <= 1e-14, "{k}: {value}");
     }
 }

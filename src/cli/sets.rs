@@ -1,15 +1,18 @@
 //! `points` and `measure`: point sets as pictures, files and numbers.
 
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use sampler_lab::error::{Error, Result};
 use sampler_lab::film::write_whole;
-use sampler_lab::points::{Measurement, SamplerSource, measure, read_csv, read_csv_file, to_csv};
+use sampler_lab::points::{
+    Measurement, Options, SamplerSource, measure, read_csv, read_csv_file, spectrum_csv, spectrum_reach, to_csv,
+};
 use sampler_lab::report::pictures::{SHEET_DOT, SHEET_PANEL, point_set_panel};
 use sampler_lab::sampling::{MAX_SAMPLES, Preset, SamplerSpec, point_set};
 use sampler_lab::stats::Points;
+use sampler_lab::stats::discrepancy::STAR_COST_LIMIT;
+use sampler_lab::stats::spectrum::Spectrum;
 use serde_json::json;
 
 use super::{WorkArgs, print, print_json, say};
@@ -107,6 +110,15 @@ pub struct Measure {
     /// One JSON document on stdout
     #[arg(long)]
     json: bool,
+    /// Leave the star discrepancy out, which is expensive in many dimensions
+    #[arg(long, conflicts_with = "max_cost")]
+    without_star: bool,
+    /// Steps of about 10 ns that the exact star discrepancy may take
+    #[arg(long, value_name = "STEPS", default_value_t = STAR_COST_LIMIT)]
+    max_cost: f64,
+    /// Write the power spectrum of a set in the plane: nu1,nu2,power,p_value
+    #[arg(long, value_name = "FILE.csv")]
+    spectrum: Option<PathBuf>,
     #[command(flatten)]
     work: WorkArgs,
 }
@@ -116,7 +128,22 @@ impl Measure {
     pub fn run(self) -> Result<()> {
         self.work.start_threads()?;
         let (points, sampler) = self.points()?;
-        let measured = Measurement { sampler, ..measure(&self.source, &points)? };
+        if self.max_cost.is_nan() || self.max_cost <= 0.0 {
+            return Err(Error::input(
+                "--max-cost",
+                format!("expected a number of steps above 0, found {}", self.max_cost),
+            ));
+        }
+        if self.spectrum.is_some() && points.dimension() != 2 {
+            let found = points.dimension();
+            return Err(Error::input("--spectrum", format!("expected points of the plane, found {found} coordinates")));
+        }
+        let options = Options { star_cost: (!self.without_star).then_some(self.max_cost) };
+        let measured = Measurement { sampler, ..measure(&self.source, &points, options)? };
+        if let Some(file) = &self.spectrum {
+            let spectrum = Spectrum::of(&points, spectrum_reach(points.n()));
+            write_whole(file, spectrum_csv(&spectrum).as_bytes())?;
+        }
         if self.json { print_json(&measured) } else { print(&measured.to_text()) }
     }
 
@@ -129,11 +156,7 @@ impl Measure {
             if self.source != "-" {
                 return Ok((read_csv_file(Path::new(&self.source))?, None));
             }
-            let mut text = String::new();
-            std::io::stdin()
-                .read_to_string(&mut text)
-                .map_err(|e| Error::input("standard input", format!("expected CSV text, found: {e}")))?;
-            return Ok((read_csv(&text, "standard input")?, None));
+            return Ok((read_csv(std::io::stdin().lock(), "standard input")?, None));
         }
         let spec = SamplerSpec::parse(&self.source, Preset::Sheet).map_err(|mut e| {
             e.what += &format!("; nor is there a file \"{}\"", self.source);

@@ -9,10 +9,13 @@
 //! | intervals of anything else, from replicates | [`bootstrap`] |
 //! | speed and accuracy, ratios of both | [`efficiency`] |
 //! | how far is an image from its reference | [`image_error`], [`trimmed`] |
+//! | how different do two pictures look | [`flip`] |
+//! | do neighbouring pixels err together | [`error_spectrum`], by a transform of any length in [`fourier`] |
+//! | how much does a pixel vary, from spectra | [`pixel_variance`] |
 //! | how fast does the error fall | [`fit`] |
 //! | does an estimator agree with the truth | [`trial`], and the tests it is made of: [`hypothesis`] |
 //! | may a t test be believed | [`tails`] |
-//! | how even is a point set | [`discrepancy`] |
+//! | how even is a point set | [`discrepancy`], [`spectrum`] |
 //!
 //! # Test your own estimator
 //!
@@ -45,11 +48,16 @@
 pub mod bootstrap;
 pub mod discrepancy;
 pub mod efficiency;
+pub mod error_spectrum;
 pub mod fit;
+pub mod flip;
+pub mod fourier;
 pub mod hypothesis;
 pub mod image_error;
 pub mod moments;
+pub mod pixel_variance;
 mod special;
+pub mod spectrum;
 pub mod tails;
 pub mod trial;
 pub mod trimmed;
@@ -57,6 +65,7 @@ pub mod trimmed;
 pub use bootstrap::{Bootstrap, Ends, Resampled};
 pub use discrepancy::{L2Kind, Points, PointsError, Side, Star};
 pub use efficiency::{Pairing, Runs, efficiency, efficiency_ratio, mean_ratio, rmse_ratio};
+pub use error_spectrum::ErrorSpectrum;
 pub use fit::{IntervalKind, LACK_OF_FIT_LEVEL, LEAST_RESIDUAL, LineFit, SlopeFit, loglog_slope, slope_with_interval};
 pub use hypothesis::{
     Claim, Family, Outcome, Verdict, binomial_test, chi2_test, equivalence_test, fisher_test, ks_test, t_test,

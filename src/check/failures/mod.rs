@@ -8,8 +8,10 @@ mod common;
 mod correlation;
 mod counts;
 mod domains;
+mod metrics;
 mod net_counts;
 mod numbers;
+mod rendering;
 mod room;
 mod scrambles;
 mod sharing;
@@ -28,6 +30,8 @@ pub fn checks() -> Vec<Check> {
         domains::checks(),
         scrambles::checks(),
         statistics::checks(),
+        rendering::checks(),
+        metrics::checks(),
     ]
     .concat()
 }

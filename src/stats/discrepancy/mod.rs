@@ -2,13 +2,18 @@
 //!
 //! Points lie in the closed unit cube [0, 1]^d: a coordinate of exactly 1 is no sample, but it has a measure.
 
+mod boxes;
+pub(super) mod double;
 mod l2;
 mod nets;
+mod ordered;
+mod plane;
 mod points;
 mod star;
+mod tournament;
 
-pub use l2::{L2Kind, l2_root, l2_squared};
-pub use nets::{min_toroidal_distance, t_value};
+pub use l2::{L2Kind, L2Value, l2, l2_all, l2_root, l2_squared};
+pub use nets::{MAX_PAIRED_DIMENSION, Projection, filled_strata, min_toroidal_distance, t_of_projections, t_value};
 pub use points::{Points, PointsError};
 pub use star::{CostTooHigh, STAR_COST_LIMIT, Side, Star, star, star_1d, star_2d, star_cost};
 

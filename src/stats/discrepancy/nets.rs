@@ -1,25 +1,93 @@
 //! Nets in base 2 and the smallest distance between points.
 
+use rayon::prelude::*;
+
 use super::Points;
 
 /// The t of a (t, m, d)-net in base 2: the smallest t for which every elementary interval of volume 2^(t−m) holds 2^t
 /// points.
 ///
 /// An elementary interval is Π [a_k 2^−e_k, (a_k + 1) 2^−e_k) with Σ e_k = m − t; a point's interval has the keys
-/// ⌊x_k 2^e_k⌋, exact in f64. All C(m − t + d − 1, d − 1) shapes are tested, from t = 0 up, O(n) each: for d = 2 that
-/// is O(n log² n) in all. t = m always passes. `None` where n is no power of two or a coordinate is 1, which lies in
-/// no interval.
+/// ⌊x_k 2^e_k⌋, exact in f64. All C(m − t + d − 1, d − 1) shapes are tested, O(n) each: for d ≤ 2 from t = 0 up,
+/// O(n log² n) in all; above, where shapes are many and t is large, from t = m down until one fails. t = m always
+/// passes. `None` where n is no power of two or a coordinate is 1, which lies in no interval.
 pub fn t_value(points: &Points) -> Option<u32> {
+    let axes: Vec<Vec<f64>> = (0..points.dimension()).map(|k| points.axis(k)).collect();
+    t_of_axes(&axes.iter().map(Vec::as_slice).collect::<Vec<_>>())
+}
+
+/// Up to this many dimensions every pair of axes is told; 1225 pairs.
+pub const MAX_PAIRED_DIMENSION: usize = 50;
+
+/// The t of one projection onto two axes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct Projection {
+    /// The two axes, from 0.
+    pub axes: [usize; 2],
+    /// The smallest t for which the projection is a (t, m, 2)-net.
+    pub t: u32,
+}
+
+/// The t-value of every projection onto two axes, in the order (0, 1), (0, 2), …, (1, 2), …: which pairs of dimensions are
+/// stratified against each other. `None` where [`t_value`] is, or above [`MAX_PAIRED_DIMENSION`]; none in one
+/// dimension.
+pub fn t_of_projections(points: &Points) -> Option<Vec<Projection>> {
+    let d = points.dimension();
+    if d > MAX_PAIRED_DIMENSION {
+        return None;
+    }
+    let axes: Vec<Vec<f64>> = (0..d).map(|k| points.axis(k)).collect();
+    let pairs: Vec<[usize; 2]> = (0..d).flat_map(|i| (i + 1..d).map(move |j| [i, j])).collect();
+    if pairs.is_empty() {
+        return t_value(points).map(|_| Vec::new());
+    }
+    pairs
+        .into_par_iter()
+        .map(|[i, j]| t_of_axes(&[&axes[i], &axes[j]]).map(|t| Projection { axes: [i, j], t }))
+        .collect()
+}
+
+/// How many of the n equal strata [k/n, (k + 1)/n) hold a point, axis by axis: n on every axis for a Latin hypercube.
+///
+/// The edges are k/n rounded to f64, so that a coordinate computed as k/n lies in stratum k; 1 lies in none.
+pub fn filled_strata(points: &Points) -> Vec<usize> {
     let n = points.n();
-    if !n.is_power_of_two() || points.iter().flatten().any(|x| *x >= 1.0) {
+    let edge = |k: usize| k as f64 / n as f64;
+    let stratum = |x: f64| {
+        // The product rounds too, and may be one off at an edge.
+        let k = (x * n as f64) as usize;
+        if x >= edge(k + 1) {
+            k + 1
+        } else if x < edge(k) {
+            k - 1
+        } else {
+            k
+        }
+    };
+    let filled = |axis: usize| {
+        let mut filled = vec![false; n];
+        points.iter().map(|p| stratum(p[axis])).filter(|k| *k < n).for_each(|k| filled[k] = true);
+        filled.into_iter().filter(|f| *f).count()
+    };
+    (0..points.dimension()).into_par_iter().map(filled).collect()
+}
+
+fn t_of_axes(axes: &[&[f64]]) -> Option<u32> {
+    let n = axes[0].len();
+    if !n.is_power_of_two() || axes.iter().any(|axis| axis.iter().any(|x| *x >= 1.0)) {
         return None;
     }
     let m = n.trailing_zeros();
     let mut counts = vec![0_u32; n];
-    (0..=m).find(|&t| {
-        let mut shape = vec![0; points.dimension()];
-        every_shape(&mut shape, 0, m - t, &mut |shape| is_even(points, shape, m - t, &mut counts))
-    })
+    let mut is_net = |t: u32| {
+        let mut shape = vec![0; axes.len()];
+        every_shape(&mut shape, 0, m - t, &mut |shape| is_even(axes, shape, m - t, &mut counts))
+    };
+    if axes.len() <= 2 {
+        (0..=m).find(|&t| is_net(t))
+    } else {
+        Some((0..m).rev().take_while(|&t| is_net(t)).last().unwrap_or(m))
+    }
 }
 
 /// Does `holds` accept every way of splitting `left` over the axes from `axis` on? Stops at the first that it does not.
@@ -35,16 +103,16 @@ fn every_shape(shape: &mut [u32], axis: usize, left: u32, holds: &mut impl FnMut
 }
 
 /// Does each of the 2^`bits` intervals of this shape hold equally many points? `counts` is scratch space.
-fn is_even(points: &Points, shape: &[u32], bits: u32, counts: &mut [u32]) -> bool {
+fn is_even(axes: &[&[f64]], shape: &[u32], bits: u32, counts: &mut [u32]) -> bool {
     let cells = &mut counts[..1 << bits];
     cells.fill(0);
-    let share = (points.n() >> bits) as u32;
-    points.iter().all(|point| {
-        let mut key = 0_usize;
-        for (x, &exponent) in point.iter().zip(shape) {
-            // A product with a power of two is exact, so the floor is the mathematical one.
-            key = (key << exponent) | (x * (1_u64 << exponent) as f64) as usize;
-        }
+    let n = axes[0].len();
+    let share = (n >> bits) as u32;
+    // A product with a power of two is exact, so the floor is the mathematical one.
+    let cut: Vec<(&[f64], u32, f64)> =
+        axes.iter().zip(shape).filter(|(_, e)| **e > 0).map(|(axis, &e)| (*axis, e, (1_u64 << e) as f64)).collect();
+    (0..n).all(|i| {
+        let key = cut.iter().fold(0, |key, (axis, exponent, scale)| (key << exponent) | (axis[i] * scale) as usize);
         cells[key] += 1;
         cells[key] <= share
     })
@@ -52,14 +120,99 @@ fn is_even(points: &Points, shape: &[u32], bits: u32, counts: &mut [u32]) -> boo
 
 /// Smallest distance between two points on the torus, where 0 and 1 are the same place; `None` for a single point.
 ///
-/// Euclidean, in [0, √d/2]; exact duplicates give 0. Points are swept along the axis on which most of them differ, and
-/// compared only while that coordinate alone is closer than the best pair so far: about O(n^(2−1/d)) for even
-/// sets, O(n log n) for random ones, O(n²) at worst.
+/// Euclidean, in [0, √d/2]; exact duplicates give 0. Up to three dimensions by a grid whose cells are as wide as the best
+/// distance so far, points entering in a scattered order: O(n) expected for any set (Rabin 1976; Golin et al. 1995).
+/// Above by a sweep along the axis on which most points differ: O(n^(2−1/d)) for even sets, O(n²) at worst.
 /// In the plane, dividing by √(2/(√3 n)) gives the share of the densest packing's distance.
 pub fn min_toroidal_distance(points: &Points) -> Option<f64> {
-    if points.n() < 2 {
-        return None;
+    match points.dimension() {
+        _ if points.n() < 2 => None,
+        1 => Some(nearest_by_grid::<1>(points).sqrt()),
+        2 => Some(nearest_by_grid::<2>(points).sqrt()),
+        3 => Some(nearest_by_grid::<3>(points).sqrt()),
+        _ => Some(nearest_by_sweep(points).sqrt()),
     }
+}
+
+/// Points by cells of the torus; cells share the places of a table, which costs comparisons and loses nothing.
+struct CellGrid {
+    /// Cells on an axis; their width is above the best distance.
+    per_axis: u64,
+    /// The last point that entered each place, and the one that entered before a point; `u32::MAX` for none.
+    last: Vec<u32>,
+    before: Vec<u32>,
+}
+
+impl CellGrid {
+    fn cell<const D: usize>(&self, p: &[f64]) -> [u64; D] {
+        std::array::from_fn(|k| ((p[k] * self.per_axis as f64) as u64).min(self.per_axis - 1))
+    }
+
+    fn place<const D: usize>(&self, cell: [u64; D]) -> usize {
+        let mixed = cell.iter().fold(0_u64, |h, c| (h ^ c).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29));
+        (mixed.wrapping_mul(0xd6e8_feb8_6659_fd93) >> 32) as usize & (self.last.len() - 1)
+    }
+
+    fn enter<const D: usize>(&mut self, i: u32, p: &[f64]) {
+        let place = self.place(self.cell::<D>(p));
+        self.before[i as usize] = std::mem::replace(&mut self.last[place], i);
+    }
+
+    /// As many cells as the squared distance allows: a percent wider than it, so that no rounding parts neighbours.
+    fn refine(&mut self, squared: f64) {
+        self.per_axis = ((0.99 / squared.sqrt()) as u64).clamp(1, 1 << 31);
+        self.last.fill(u32::MAX);
+    }
+}
+
+/// Smallest squared distance of at least two points in D dimensions.
+fn nearest_by_grid<const D: usize>(points: &Points) -> f64 {
+    let all: Vec<&[f64]> = points.iter().collect();
+    let n = u32::try_from(all.len()).expect("fewer than 2^32 points");
+    // Scattered by a fixed multiplication, so that no order of the points makes the grid be built too often.
+    let mut order: Vec<u32> = (0..n).collect();
+    order.sort_unstable_by_key(|i| {
+        (u64::from(*i) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(31).wrapping_mul(0xbf58_476d_1ce4_e5b9)
+    });
+    let mut grid = CellGrid {
+        per_axis: 1,
+        last: vec![u32::MAX; (2 * all.len()).next_power_of_two()],
+        before: vec![u32::MAX; all.len()],
+    };
+    let mut nearest = f64::INFINITY;
+    for (entered, &i) in order.iter().enumerate() {
+        let p = all[i as usize];
+        let before = nearest;
+        let cell = grid.cell::<D>(p);
+        for neighbour in 0..3_u64.pow(D as u32) {
+            let mut rest = neighbour;
+            let around = cell.map(|c| {
+                let step = rest % 3;
+                rest /= 3;
+                (c + grid.per_axis + step - 1) % grid.per_axis
+            });
+            let mut other = grid.last[grid.place(around)];
+            while other != u32::MAX {
+                nearest = nearest.min(squared_distance(p, all[other as usize]));
+                other = grid.before[other as usize];
+            }
+        }
+        if nearest == 0.0 {
+            return 0.0;
+        }
+        if nearest < before {
+            grid.refine(nearest);
+            order[..=entered].iter().for_each(|&j| grid.enter::<D>(j, all[j as usize]));
+        } else {
+            grid.enter::<D>(i, p);
+        }
+    }
+    nearest
+}
+
+/// Smallest squared distance of at least two points: points are compared only while one coordinate alone is closer than
+/// the best pair so far.
+fn nearest_by_sweep(points: &Points) -> f64 {
     let distinct = |axis: &usize| {
         let mut values = points.axis(*axis);
         values.sort_by(f64::total_cmp);
@@ -82,8 +235,11 @@ pub fn min_toroidal_distance(points: &Points) -> Option<f64> {
             }
             nearest = nearest.min(squared_distance(from, to));
         }
+        if nearest == 0.0 {
+            break;
+        }
     }
-    Some(nearest.sqrt())
+    nearest
 }
 
 /// Squared Euclidean distance on the torus.
@@ -191,6 +347,52 @@ mod tests {
                 Ok(())
             })
             .expect("equal");
+    }
+
+    /// In space the grid, in four dimensions the sweep: against all pairs.
+    #[test]
+    fn the_smallest_distance_in_one_to_four_dimensions_is_that_of_all_pairs() {
+        let sets = (1..=4_usize, prop::collection::vec(prop::collection::vec(coordinate(), 4), 2..80));
+        runner(200)
+            .run(&sets, |(d, set)| {
+                let set: Vec<&[f64]> = set.iter().map(|p| &p[..d]).collect();
+                let points = Points::new(d, set.concat()).expect("valid");
+                let pairs = (0..set.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
+                let twin = pairs.map(|(i, j)| squared_distance(set[i], set[j])).fold(f64::INFINITY, f64::min);
+                prop_assert_eq!(min_toroidal_distance(&points), Some(twin.sqrt()));
+                Ok(())
+            })
+            .expect("equal");
+    }
+
+    /// A cluster of 3000 points in a cell of any coarse grid, and a far pair a rounding apart.
+    #[test]
+    fn clusters_at_any_scale_are_resolved() {
+        let mut set: Vec<[f64; 2]> =
+            (0..3000).map(|i| [0.3 + 1e-9 * f64::from(i % 50), 0.6 + 1e-9 * f64::from(i / 50)]).collect();
+        assert!((min_toroidal_distance(&plane(&set)).expect("many") - 1e-9).abs() < 1e-15);
+        set.extend([[0.5, 0.5], [0.5 + f64::EPSILON / 2.0, 0.5]]);
+        assert_eq!(min_toroidal_distance(&plane(&set)), Some(f64::EPSILON / 2.0));
+    }
+
+    #[test]
+    fn projections_and_strata_tell_which_axes_are_stratified() {
+        // Hammersley in x and y; the third axis repeats the first: a diagonal, whose t is m − 1.
+        let n = 64_u32;
+        let y = |i: u32| f64::from(i.reverse_bits()) / 4_294_967_296.0;
+        let set: Vec<f64> = (0..n).flat_map(|i| [f64::from(i) / 64.0, y(i), f64::from(i) / 64.0]).collect();
+        let points = Points::new(3, set).expect("valid");
+        let t: Vec<([usize; 2], u32)> = t_of_projections(&points).expect("2^6").iter().map(|p| (p.axes, p.t)).collect();
+        assert_eq!(t, [([0, 1], 0), ([0, 2], 5), ([1, 2], 0)]);
+        assert_eq!(t_value(&points), Some(5));
+        assert_eq!(filled_strata(&points), [64, 64, 64]);
+        let odd = plane(&[[0.1, 1.0], [0.2, 0.5], [0.9, 0.6]]);
+        assert_eq!((t_of_projections(&odd), filled_strata(&odd)), (None, vec![2, 1]));
+        for n in 1..200_u32 {
+            let lattice: Vec<f64> = (0..n).map(|i| f64::from(i) / f64::from(n)).collect();
+            assert_eq!(filled_strata(&Points::new(1, lattice).expect("valid")), [n as usize], "{n}");
+        }
+        assert_eq!(t_of_projections(&Points::new(1, vec![0.1, 0.7]).expect("valid")), Some(vec![]));
     }
 
     #[test]

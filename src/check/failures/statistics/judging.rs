@@ -180,6 +180,7 @@ fn picture(value: f64, scene: &str, sampler: &str, seed: &str) -> Picture {
         height: 1,
         pixels: vec![[value; 3]],
         corner: None,
+        is_display: false,
         provenance: says.map(|(k, v)| (k.to_owned(), v.to_owned())).to_vec(),
         notes: Vec::new(),
     }
