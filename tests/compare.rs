@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use sampler_lab::compare::{Errors, Metric, Reference};
-use sampler_lab::film::{Image, Picture, read_exr, read_picture, write_exr, write_pfm};
+use sampler_lab::film::{Image, Picture, read_exr, read_picture, write_exr, write_pfm, write_png};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -502,6 +502,71 @@ fn a_gate_decides_the_exit_code() {
     let both = compare(folder.path(), &[&image, &other, "--reference", &reference, "--gate", "mae < 0.2"]);
     let both = both.ends(1, &["grey.exr"]);
     assert!(!both.stderr.contains("half-zip.exr"), "{}", both.stderr);
+}
+
+/// Radiance from black to far above white, and how its PNG shows it.
+fn waves(phase: f32) -> Image {
+    let pixel = |p: usize| {
+        let (x, y) = ((p % 24) as f32, (p / 24) as f32);
+        [0.0, 1.0, 2.0].map(|c| (1.5 + 2.0 * libm::sinf(0.4 * x + 0.3 * y + c + phase)).max(0.0))
+    };
+    Image { width: 24, height: 16, pixels: (0..24 * 16).map(pixel).collect() }
+}
+
+#[test]
+fn flip_of_radiance_is_flip_of_the_pngs_that_show_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    for (name, image) in [("a", waves(0.0)), ("b", waves(0.5))] {
+        write_exr(&path(&format!("{name}.exr")), &image, &[]).unwrap();
+        for exposure in [3.0, 0.7] {
+            write_png(&path(&format!("{name}-{exposure}.png")), &image, exposure).unwrap();
+        }
+    }
+    let flip = |arguments: &[&str]| {
+        let found = compare(folder.path(), &[arguments, &["--json"]].concat()).json();
+        assert!(found["images"][0]["flip"]["ci95"].is_null());
+        let viewing = (&found["viewing"]["pixels_per_degree"], &found["viewing"]["exposure"]);
+        assert!(viewing.0.as_f64().is_some() && viewing.1.as_f64().is_some(), "{found}");
+        ["flip", "flip_weighted_median"].map(|name| found["images"][0][name]["value"].as_f64().unwrap())
+    };
+    let radiance = flip(&["a.exr", "--reference", "b.exr"]);
+    assert!(radiance[0] > 0.01 && radiance[1] >= radiance[0] && radiance[1] < 1.0, "{radiance:?}");
+    let close = |a: [f64; 2], b: [f64; 2]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6);
+    assert!(close(radiance, flip(&["a-3.png", "--reference", "b-3.png"])));
+    // A PNG is shown as it is, beside radiance too; the order does not matter.
+    assert!(close(radiance, flip(&["b-3.png", "--reference", "a.exr"])));
+    let darker = flip(&["a.exr", "--reference", "b.exr", "--exposure", "0.7"]);
+    assert!(close(darker, flip(&["a-0.7.png", "--reference", "b-0.7.png"])) && !close(darker, radiance));
+    // From further away less is seen.
+    assert!(flip(&["a.exr", "--reference", "b.exr", "--ppd", "200"])[0] < radiance[0]);
+    assert_eq!(flip(&["a.exr", "--reference", "a-3.png"]), [0.0, 0.0]);
+    let whole = compare(folder.path(), &["a.exr", "--reference", "b.exr", "--gate", "flip < 0.9"]).ends(0, &[]);
+    assert!(
+        whole.stdout.contains("67.0206 pixels a degree") && whole.stdout.contains("exposure 3"),
+        "{}",
+        whole.stdout
+    );
+    compare(folder.path(), &["a.exr", "--reference", "b.exr", "--gate", "flip < 1e-3"])
+        .ends(1, &["expected flip < 1e-3"]);
+    compare(folder.path(), &["a.exr", "--reference", "b.exr", "--ppd", "0.5"]).refused(&["--ppd", "1 to 1000"]);
+    compare(folder.path(), &["a.exr", "--reference", "b.exr", "--exposure", "0"]).refused(&["--exposure", "above 0"]);
+}
+
+#[test]
+fn flip_of_replicates_has_an_interval() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, phase) in [("a", 0.1), ("b", -0.1), ("c", 0.2), ("r", 0.0)] {
+        write_exr(&folder.path().join(format!("{name}.exr")), &waves(phase), &[]).unwrap();
+    }
+    let arguments =
+        ["a.exr", "b.exr", "c.exr", "--replicates", "--reference", "r.exr", "--json", "--gate", "flip.low > 0"];
+    let found = compare(folder.path(), &arguments).json();
+    let (flip, values) = (&found["replicates"]["flip"], &found["images"]);
+    let value = |v: &Value| v["value"].as_f64().unwrap();
+    let mean = (0..3).map(|i| value(&values[i]["flip"])).sum::<f64>() / 3.0;
+    assert!((value(flip) - mean).abs() < 1e-15);
+    assert!(flip["ci95"][0].as_f64().unwrap() < mean && mean < flip["ci95"][1].as_f64().unwrap());
 }
 
 #[test]

@@ -1,11 +1,9 @@
 //! The same scene and numbers give the same bits: on any number of threads, pixel by pixel, sample by sample, today and after
 //! the next change.
 
-mod common;
-
-use common::{Room, ceiling, looking_at, spec};
 use glam::Vec3;
 use sampler_lab::accel;
+use sampler_lab::check::room::{Room, ceiling, looking_at, spec};
 use sampler_lab::film::Image;
 use sampler_lab::render::{self, render, render_sample};
 use sampler_lab::sampling::{self, PointSource, Points, Sampler, SamplerSpec, every_legal_spec};

@@ -434,7 +434,7 @@ fn rows_are_in_plan_order_and_complete() {
                 assert_eq!(row.focal_depth, (row.scene == "ramp").then_some(4.5), "what auto focus found is recorded");
             }
             Row::Image(row) if row.sampler == "fresh:step" => assert_eq!(row.names, ["fresh:sheet", "fresh:best"]),
-            Row::Image(_) | Row::Points(_) => {}
+            Row::Image(_) | Row::Points(_) | Row::Prediction(_) => {}
         }
     }
     let about = results::read_about(&results::about_path(folder.path())).unwrap();
@@ -606,6 +606,7 @@ fn raised_metrics_measure_again_without_rendering() {
         Row::Reference(row) => Some(row.metrics_algorithm),
         Row::Ensemble(row) => Some(row.metrics_algorithm),
         Row::Points(row) => Some(row.metrics_algorithm),
+        Row::Prediction(_) => None,
     };
     assert!(rows(folder.path()).iter().filter_map(number).all(|number| number == 2));
 }

@@ -52,6 +52,16 @@ fn scrambles() {
 }
 
 #[test]
+fn lights() {
+    run_group("failures: lights");
+}
+
+#[test]
+fn camera() {
+    run_group("failures: camera");
+}
+
+#[test]
 fn metrics() {
     run_group("failures: metrics");
 }

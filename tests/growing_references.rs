@@ -250,7 +250,7 @@ fn a_closed_form_has_no_batches_and_keeps_its_id() {
             Work::Reference(work) => work.scene == "exact",
             Work::Ensemble(work) => work.scene == "exact",
             Work::Image(work) => work.scene == "exact",
-            Work::Points(_) => false,
+            Work::Points(_) | Work::Prediction(_) => false,
         };
         plan.items.iter().filter(|item| is_exact(&item.work)).map(|item| item.id.clone()).collect()
     };

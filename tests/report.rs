@@ -10,7 +10,7 @@ use sampler_lab::experiment::lab::Lab;
 use sampler_lab::experiment::plan::plan;
 use sampler_lab::experiment::progress::Silent;
 use sampler_lab::experiment::results::{
-    EnsembleRow, Growth, Kind, ReferenceRow, Row, Timing, read, read_about, read_timings, timings_path,
+    EnsembleRow, ErrorSpectrum, Growth, Kind, ReferenceRow, Row, Timing, read, read_about, read_timings, timings_path,
 };
 use sampler_lab::experiment::spec::Experiment;
 use sampler_lab::report::{Figures, Measurements, Summary, summarise, text, text_with, write};
@@ -123,6 +123,47 @@ fn tables_hold_nothing_from_a_clock_and_every_artefact_says_what_made_it() {
     let csv = std::fs::read_to_string(a.path().join("summary.csv")).unwrap();
     let fields: Vec<usize> = csv.lines().skip(1).map(|line| line.split(',').count()).collect();
     assert!(fields.len() == 1 + 5 * 3 && fields.iter().all(|&n| n == fields[0]), "{fields:?}");
+}
+
+/// A spectrum with this share of its power at low frequencies, of which white noise has 1/20.
+fn spectrum(share: f64, p: Option<f64>) -> Box<ErrorSpectrum> {
+    Box::new(ErrorSpectrum {
+        frequency: vec![0.02, 0.1, 0.4],
+        power: vec![share, 1.0, 1.0],
+        low: None,
+        high: None,
+        low_share: Some(estimate(share, 0.01)),
+        white_low_share: 0.05,
+        p_white: p,
+        blur_1: Some(estimate(20.0 * share, 0.1)),
+        blur_2: Some(estimate(20.0 * share, 0.1)),
+    })
+}
+
+#[test]
+fn pixels_that_err_together_are_told_from_those_that_do_not() {
+    let with = |halton: (f64, f64), others: f64| {
+        edited(
+            |_, _| true,
+            |row| {
+                let (share, p) = if row.sampler.starts_with("halton:joint") { halton } else { (0.05, others) };
+                row.error_spectrum = Some(spectrum(share, Some(p)));
+            },
+        )
+    };
+    let none = with((0.06, 0.02), 0.5);
+    assert!(none.contains("Do pixels err independently?") && none.contains("none finds a difference"), "{none}");
+    // Holm: five tests, so 0.001 is 0.005 after adjustment, and 0.003 is not below 0.01.
+    let alike = with((0.25, 0.001), 0.5);
+    assert!(alike.contains("errors go together over many pixels, have `halton:best` in `a01` (5"), "{alike}");
+    assert!(with((0.25, 0.003), 0.5).contains("none finds a difference"));
+    let blue = with((0.01, 1e-6), 0.5);
+    assert!(
+        blue.contains("errors of neighbours cancel, have `halton:best` in `a01`") && blue.contains("< 1e−4"),
+        "{blue}"
+    );
+    // Rows of earlier versions have no spectra, and nothing is said of any.
+    assert!(!edited(|_, _| true, |_| {}).contains("Do pixels err independently?"));
 }
 
 #[test]

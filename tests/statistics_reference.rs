@@ -4,6 +4,7 @@
 use sampler_lab::stats::discrepancy::{
     L2Kind, Points, Side, Star, l2_root, l2_squared, min_toroidal_distance, star, star_2d, t_value,
 };
+use sampler_lab::stats::flip::{DEFAULT_PPD, Seen};
 use sampler_lab::stats::hypothesis::{benjamini_hochberg, chi2_upper_tail, holm, sidak, welch};
 use sampler_lab::stats::image_error::{bias, mae, max_abs, mse, mse_unbiased, rel_mse, smape};
 use sampler_lab::stats::moments::{Moments, student_t_quantile};
@@ -113,6 +114,14 @@ fn image_metrics_meet_the_reference() {
         ] {
             assert_close(ours, &value(name), 1e-12, name);
         }
+        let width = list(&case["a"])[0].as_array().expect("a row").len();
+        let seen = |flat: &[f64]| {
+            // The numbers are sRGB code values as shares of the largest.
+            let decoded = |v: f64| if v <= 0.04045 { v / 12.92 } else { libm::pow((v + 0.055) / 1.055, 2.4) };
+            let pixel = |p: usize| [flat[3 * p], flat[3 * p + 1], flat[3 * p + 2]].map(decoded);
+            Seen::new(width, flat.len() / 3 / width, DEFAULT_PPD, pixel)
+        };
+        assert_close(seen(&a).flip(&seen(&b)).mean, &value("FLIP_mean"), 1e-4, "FLIP");
     }
 }
 

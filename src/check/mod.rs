@@ -13,6 +13,7 @@ pub mod estimators;
 pub mod failures;
 pub mod harness;
 pub mod metrics;
+pub mod room;
 pub mod samplers;
 pub mod statistics;
 

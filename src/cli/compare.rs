@@ -4,11 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use sampler_lab::compare::{
-    Comparison, Gate, ImageErrors, Reference, ReplicatesErrors, check_memory, difference, mean_picture,
+    Comparison, Gate, ImageErrors, LOOKING, Reference, ReplicatesErrors, Viewing, check_memory, difference,
+    mean_picture,
 };
 use sampler_lab::error::{Error, Result};
-use sampler_lab::film::{Picture, read_picture, write_exr, write_pfm};
+use sampler_lab::film::{DEFAULT_EXPOSURE, Picture, read_picture, write_exr, write_pfm};
 use sampler_lab::report::pictures::{error_map, error_scale};
+use sampler_lab::stats::flip::DEFAULT_PPD;
 
 use super::{print, print_json, say};
 
@@ -36,6 +38,12 @@ pub struct Compare {
     /// Demand such as "rmse < 0.1 and bias > -0.01"; METRIC.low and METRIC.high are the interval's ends
     #[arg(long, value_name = "EXPR")]
     gate: Option<String>,
+    /// For flip: exposure at which radiance is shown; a PNG is shown as it is
+    #[arg(long, value_name = "E", default_value_t = DEFAULT_EXPOSURE)]
+    exposure: f32,
+    /// For flip: pixels a degree, as seen from 0.7 m on a screen 0.7 m wide with 3840 columns
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_PPD)]
+    ppd: f64,
     /// One JSON document on stdout
     #[arg(long)]
     json: bool,
@@ -52,12 +60,13 @@ impl Compare {
             gate.check(self.reference2.is_some(), self.replicates)?;
         }
         self.check_arguments()?;
+        let viewing = Viewing::new(self.ppd, self.exposure)?;
         let diff = self.diff.as_deref().map(|path| Ok((path, DiffFormat::of(path)?))).transpose()?;
-        let reference = self.read_reference()?;
-        // References with their mean; one image at a time, or all of them with theirs, and a difference.
+        let reference = self.read_reference()?.viewed(viewing);
+        // References with their mean; one image at a time, or all of them with theirs, and a difference; and looking at two.
         let references = if self.reference2.is_some() { 3 } else { 1 };
         let images = if self.replicates { self.images.len() + 1 } else { 1 };
-        check_memory(references + images + usize::from(diff.is_some()), reference.mean())?;
+        check_memory(references + images + usize::from(diff.is_some()) + LOOKING, reference.mean())?;
 
         let names = [Some(&self.reference), self.reference2.as_ref()].map(|path| path.map(|p| p.display().to_string()));
         let [name, name2] = &names;

@@ -12,24 +12,28 @@
 //! | `smape` | mean \|d\|/(\|T\| + \|R\|), 0/0 = 0, no factor 2 | 1 |
 //! | `bias` | mean d | radiance |
 //! | `mse_trimmed`, `rel_mse_trimmed` | without the worst 0.01 % of pixels | as above |
+//! | `flip`, `flip_weighted_median` | how different they look on a screen ([`Viewing`]), 0 to 1: no estimate of any of the others | 1 |
 //! | `bias2`, `variance` | of replicates: squared bias, variance between them | radiance² |
 
 mod gate;
 mod kinship;
 mod table;
+mod viewing;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use serde::{Serialize, Serializer};
 
 use crate::error::{Error, Result};
 use crate::film::{PICTURE_PIXEL_BYTES, Picture};
+use crate::stats::flip::{Flip, Seen};
 use crate::stats::image_error::{self, bias, mae, max_abs, mse, mse_unbiased, rel_mse, smape};
 use crate::stats::trimmed::{mse_trimmed, rel_mse_trimmed, trimmed_pixels};
 use crate::stats::{Estimate, t_interval};
 
 pub use gate::{Gate, GateResult};
 pub use kinship::kinship;
+pub use viewing::Viewing;
 
 /// Most memory that the images compared at one time may take, 4 GiB.
 pub const MAX_BYTES: u64 = 4 << 30;
@@ -49,13 +53,15 @@ pub enum Metric {
     MaxAbs,
     MseTrimmed,
     RelMseTrimmed,
+    Flip,
+    FlipWeightedMedian,
     Bias2,
     Variance,
 }
 
 impl Metric {
     /// All, in the order they are printed.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 15] = [
         Self::Mse,
         Self::Rmse,
         Self::MseUnbiased,
@@ -67,6 +73,8 @@ impl Metric {
         Self::MaxAbs,
         Self::MseTrimmed,
         Self::RelMseTrimmed,
+        Self::Flip,
+        Self::FlipWeightedMedian,
         Self::Bias2,
         Self::Variance,
     ];
@@ -85,6 +93,8 @@ impl Metric {
             Self::MaxAbs => "max_abs",
             Self::MseTrimmed => "mse_trimmed",
             Self::RelMseTrimmed => "rel_mse_trimmed",
+            Self::Flip => "flip",
+            Self::FlipWeightedMedian => "flip_weighted_median",
             Self::Bias2 => "bias2",
             Self::Variance => "variance",
         }
@@ -129,6 +139,9 @@ pub struct Reference {
     second: Option<Arc<Picture>>,
     /// The mean of both, or the only one.
     mean: Arc<Picture>,
+    viewing: Viewing,
+    /// What an eye makes of the mean, once somebody asks.
+    seen: OnceLock<Seen>,
 }
 
 impl Reference {
@@ -139,7 +152,7 @@ impl Reference {
     pub fn new(first: (&str, Picture), second: Option<(&str, Picture)>) -> Result<Self> {
         let (name, first) = (first.0, Arc::new(first.1));
         let Some((name2, second)) = second else {
-            return Ok(Self { mean: first.clone(), first, second: None });
+            return Ok(Self::of(first.clone(), first, None));
         };
         check_size(&second, name2, &first)?;
         if second.pixels == first.pixels || kinship(&second, &first).is_some() {
@@ -149,8 +162,24 @@ impl Reference {
         }
         let middle = |(a, b): (&[f64; 3], &[f64; 3])| std::array::from_fn(|c| (a[c] + b[c]) / 2.0);
         let pixels = first.pixels.iter().zip(&second.pixels).map(middle).collect();
-        let mean = Picture { pixels, provenance: Vec::new(), notes: Vec::new(), ..*first };
-        Ok(Self { first, second: Some(Arc::new(second)), mean: Arc::new(mean) })
+        let is_display = first.is_display && second.is_display;
+        let mean = Picture { pixels, provenance: Vec::new(), notes: Vec::new(), is_display, ..*first };
+        Ok(Self::of(Arc::new(mean), first, Some(Arc::new(second))))
+    }
+
+    fn of(mean: Arc<Picture>, first: Arc<Picture>, second: Option<Arc<Picture>>) -> Self {
+        Self { first, second, mean, viewing: Viewing::default(), seen: OnceLock::new() }
+    }
+
+    /// Looked at in other than the usual way.
+    #[must_use]
+    pub fn viewed(self, viewing: Viewing) -> Self {
+        Self { viewing, seen: OnceLock::new(), ..self }
+    }
+
+    /// How different an image looks.
+    fn flip(&self, image: &Picture) -> Flip {
+        self.seen.get_or_init(|| self.viewing.see(&self.mean)).flip(&self.viewing.see(image))
     }
 
     /// The reference, or the mean of both.
@@ -238,7 +267,7 @@ impl Reference {
             .second
             .as_ref()
             .map(|second| mse_unbiased(t, self.first.pixels.as_flattened(), second.pixels.as_flattened()));
-        let plain = mse(t, r);
+        let (plain, flip) = (mse(t, r), self.flip(image));
         let value = |metric| match metric {
             Metric::Mse => Some(plain),
             Metric::Rmse => Some(plain.sqrt()),
@@ -251,6 +280,8 @@ impl Reference {
             Metric::MaxAbs => Some(max_abs(t, r)),
             Metric::MseTrimmed => mse_trimmed(&image.pixels, &self.mean.pixels),
             Metric::RelMseTrimmed => rel_mse_trimmed(&image.pixels, &self.mean.pixels),
+            Metric::Flip => Some(flip.mean),
+            Metric::FlipWeightedMedian => Some(flip.weighted_median),
             Metric::Bias2 | Metric::Variance => None,
         };
         let metrics = Metric::ALL.into_iter().filter(|metric| !metric.needs_replicates());
@@ -304,6 +335,9 @@ fn check_size(image: &Picture, name: &str, reference: &Picture) -> Result<()> {
     let what = format!("expected the reference's {w}×{h} pixels, found {}×{}", image.width, image.height);
     Err(Error::input(name, what))
 }
+
+/// Memory that looking at image and reference takes, in images: 40 bytes a pixel each, and 8 of their difference.
+pub const LOOKING: usize = 4;
 
 /// Refuses more images at one time than memory should hold.
 ///
@@ -367,6 +401,8 @@ pub struct Comparison {
     pub size: String,
     /// Mean square error of the mean of both references; `None` for one.
     pub reference_noise_mse: Option<f64>,
+    /// How images and reference are looked at, for `flip`.
+    pub viewing: Viewing,
     /// Pixels that the trimmed metrics leave out.
     pub trimmed_pixels: usize,
     /// Each image, in the order named.
@@ -386,6 +422,7 @@ impl Comparison {
             reference2: name2.map(str::to_owned),
             size: format!("{}x{}", mean.width, mean.height),
             reference_noise_mse: reference.noise_mse(),
+            viewing: reference.viewing,
             trimmed_pixels: trimmed_pixels(mean.pixels.len()),
             images: Vec::new(),
             replicates: None,

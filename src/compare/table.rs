@@ -6,7 +6,7 @@ use super::{Comparison, Errors, Metric};
 use crate::stats::Estimate;
 
 /// Metrics of the table of images; the others have a line below it.
-const COLUMNS: [Metric; 8] = [
+const COLUMNS: [Metric; 9] = [
     Metric::Mse,
     Metric::Rmse,
     Metric::MseUnbiased,
@@ -15,6 +15,7 @@ const COLUMNS: [Metric; 8] = [
     Metric::Smape,
     Metric::Bias,
     Metric::MaxAbs,
+    Metric::Flip,
 ];
 
 /// Width of a column of numbers.
@@ -50,6 +51,7 @@ impl fmt::Display for Comparison {
             }
             writeln!(f)?;
         }
+        writeln!(f, "\n{}", self.viewing)?;
         if let Some(replicates) = &self.replicates {
             writeln!(f, "\n{} replicates of one estimator: mean and 95 % interval", replicates.count)?;
             write_ensemble(f, &replicates.errors)?;

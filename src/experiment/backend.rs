@@ -9,8 +9,10 @@ use std::sync::atomic::AtomicBool;
 
 use serde::{Deserialize, Serialize};
 
+use super::plan::PredictionWork;
+use super::prediction::Predicted;
 pub use super::variant::Variant;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::Image;
 use crate::sampling::Decision;
 pub use crate::scene::compile::Stage;
@@ -289,6 +291,15 @@ pub trait Backend {
     /// # Errors
     /// Kind `Input` where the sampler has no points.
     fn point_metrics(&self, canonical: &str, n: u32, seed: u64, metrics: &[String]) -> Result<PointMetrics>;
+
+    /// Predicts and measures variances of single pixels; no bit depends on the number of threads.
+    ///
+    /// # Errors
+    /// Kind `Incomplete` where no pixel has a variance, or where the backend knows no spectra.
+    fn predict(&self, work: &PredictionWork, threads: usize) -> Result<Predicted> {
+        let _ = threads;
+        Err(Error::incomplete(&work.scene, "expected a backend that predicts variances, found one that does not"))
+    }
 }
 
 #[cfg(test)]

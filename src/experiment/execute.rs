@@ -24,7 +24,9 @@ use super::lines::{line, write_lines};
 use super::machine;
 use super::measure::{self, ReferenceImages};
 use super::origin::Origin;
+use super::pixels;
 use super::plan::{EnsembleWork, ImageWork, Plan, PointsWork, ReferenceSource, ReferenceWork, Work, WorkItem};
+use super::prediction;
 use super::progress::{Meter, Progress};
 use super::results::{
     self, EnsembleRow, ImageErrors, ImageRow, Kind, PointsRow, ReferenceRow, Row, SCHEMA, Source, Timing, read_image,
@@ -35,6 +37,7 @@ use super::superseded::{self, Settled};
 use super::survey::{self, Limits, Standing, State, Survey};
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::{Image, write_exr};
+use crate::stats::t_interval;
 use grow::Growing;
 
 /// How to run.
@@ -411,6 +414,10 @@ impl<'a> Run<'a> {
             Work::Reference(work) => self.reference_row(item, work).map(Row::Reference),
             Work::Ensemble(work) => self.ensemble_row(item, work).map(Row::Ensemble),
             Work::Points(work) => self.points_row(item, work).map(Row::Points),
+            Work::Prediction(work) => {
+                let found = self.backend.predict(work, self.options.threads)?;
+                Ok(Row::Prediction(prediction::row(item, work, found)))
+            }
         }
     }
 
@@ -422,7 +429,10 @@ impl<'a> Run<'a> {
         let image = self.image(&item.id)?;
         let errors: Option<ImageErrors> = match &work.reference_id {
             None => None,
-            Some(id) => Some(measure::errors(&image, &*self.reference(id)?, id, item.metrics_algorithm)),
+            Some(id) => {
+                let (reference, exposure) = (self.reference(id)?, self.plan.exposure(&work.scene));
+                Some(measure::errors(&image, &reference, id, item.metrics_algorithm, exposure))
+            }
         };
         let twin = match &work.twin {
             None => None,
@@ -489,6 +499,8 @@ impl<'a> Run<'a> {
         let members: Vec<Arc<Image>> = work.members.iter().map(|id| self.image(id)).collect::<Result<_>>()?;
         let reference = self.reference(&work.reference_id)?;
         let (e, error_autocorrelation) = measure::ensemble(&members, &reference);
+        let exposure = self.plan.exposure(&work.scene);
+        let flips: Vec<f64> = members.iter().map(|image| reference.flip(image, exposure).mean).collect();
         Ok(EnsembleRow {
             schema: SCHEMA,
             id: item.id.clone(),
@@ -510,6 +522,8 @@ impl<'a> Run<'a> {
             variance: e.variance,
             bias: e.bias,
             error_autocorrelation,
+            flip: Some(t_interval(&flips, 0.95).with_rounded_interval()),
+            error_spectrum: work.variant.is_plain().then(|| Box::new(pixels::spectrum(&members, &reference))),
             members: work.members.clone(),
             made_with: None,
         })

@@ -6,8 +6,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use super::backend::{Algorithms, Backend, PointMetrics, RenderRequest, SceneFacts, Size, Variant};
+use super::backend::{Algorithms, Backend, Estimator, PointMetrics, RenderRequest, SceneFacts, Size, Variant};
 use super::exact;
+use super::plan::PredictionWork;
+use super::prediction::{self, Predicted};
 use super::results::About;
 use crate::error::{Error, Result};
 use crate::film::Image;
@@ -18,6 +20,7 @@ use crate::scene::compile::{Scene, Stage, check_reach};
 use crate::scene::load::{self, LoadedScene, OpenOptions};
 use crate::scene::scale::scaled;
 use crate::stats::discrepancy::{L2Kind, Points, l2_root, min_toroidal_distance, star_2d, t_value};
+use crate::stats::pixel_variance::Integrand;
 
 /// Raised whenever the bits of image errors or point-set metrics may change.
 pub const METRICS_ALGORITHM: u32 = 2;
@@ -70,6 +73,9 @@ impl Compiled {
     }
 }
 
+/// Scene, size of the image, and column and row.
+type PixelOf = (String, Size, [u32; 2]);
+
 /// Renders with the lab.
 #[derive(Default)]
 pub struct Lab {
@@ -84,6 +90,8 @@ pub struct Lab {
     /// Scenes whose files are not there, so that what was recorded of them stood in.
     stood_in: RefCell<Vec<String>>,
     pools: RefCell<HashMap<usize, Arc<rayon::ThreadPool>>>,
+    /// What single pixels see, by scene, size and pixel.
+    integrands: RefCell<HashMap<PixelOf, Arc<Integrand>>>,
 }
 
 impl Lab {
@@ -337,6 +345,36 @@ impl Backend for Lab {
         let set = point_set(single(canonical)?, n, seed)?;
         let points = Points::new_2d(&set).map_err(|e| Error::incomplete(canonical, e))?;
         metrics.iter().map(|name| Ok((name.clone(), point_metric(name, &points)?))).collect()
+    }
+
+    fn predict(&self, work: &PredictionWork, threads: usize) -> Result<Predicted> {
+        let request = RenderRequest {
+            scene: &work.scene,
+            sampler: &work.sampler,
+            spp: work.spp.asked,
+            seed: work.seed,
+            size: work.size,
+            estimator: Estimator::Unbiased,
+            stage: Stage::Final,
+            variant: Variant::Plain,
+            threads,
+            stop: None,
+        };
+        self.prepare(&request)?;
+        let (pool, set) = (self.pool(threads)?, set(&work.sampler)?);
+        self.with(&work.scene, |opened| {
+            let scene = &opened.compiled[&Compiled::full()];
+            let mut known = self.integrands.borrow_mut();
+            let mut integrand = |pixel: [u32; 2]| {
+                let key = (work.scene.clone(), work.size, pixel);
+                known
+                    .entry(key)
+                    .or_insert_with(|| Arc::new(pool.install(|| prediction::integrand(scene, pixel))))
+                    .clone()
+            };
+            let integrands: Vec<_> = work.pixels.iter().map(|&pixel| integrand(pixel)).collect();
+            pool.install(|| prediction::predict(scene, set, work, &integrands))
+        })
     }
 }
 

@@ -1,12 +1,14 @@
 //! From images to the numbers of a row.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::error::{Error, Result};
 use crate::film::Image;
+use crate::stats::flip::{Flip, Seen};
 use crate::stats::{Ensemble, Estimate, image_error, sum, t_interval};
 
 use super::identity::pixel_hash;
+use super::pixels::see;
 use super::results::{ImageErrors, JUMP, TwinDifference};
 
 /// What images are compared with: two independent halves, or a closed form given twice.
@@ -14,6 +16,8 @@ pub struct ReferenceImages {
     halves: [Arc<Image>; 2],
     /// Mean of the halves, rounded once to `f32`.
     mean: Vec<[f32; 3]>,
+    /// What an eye makes of the mean, and at which exposure: a scene has one.
+    seen: OnceLock<(f32, Seen)>,
 }
 
 impl ReferenceImages {
@@ -24,7 +28,7 @@ impl ReferenceImages {
         let mean = std::iter::zip(&a.pixels, &b.pixels)
             .map(|(a, b)| [half_sum((&a[0], &b[0])), half_sum((&a[1], &b[1])), half_sum((&a[2], &b[2]))])
             .collect();
-        Self { halves, mean }
+        Self { halves, mean, seen: OnceLock::new() }
     }
 
     /// Mean square error of the halves' mean: 0 for a closed form.
@@ -49,6 +53,19 @@ impl ReferenceImages {
         pixel_hash(&self.mean)
     }
 
+    /// How different an image looks, both shown at this exposure.
+    pub fn flip(&self, image: &Image, exposure: f32) -> Flip {
+        let width = self.halves[0].width;
+        let (seen_at, seen) = self.seen.get_or_init(|| (exposure, see(&self.mean, width, exposure)));
+        assert_eq!(*seen_at, exposure, "a reference at two exposures");
+        seen.flip(&see(&image.pixels, image.width, exposure))
+    }
+
+    /// The two.
+    pub fn halves(&self) -> &[Arc<Image>; 2] {
+        &self.halves
+    }
+
     fn flat(&self) -> [&[f32]; 2] {
         self.halves.each_ref().map(|half| half.pixels.as_flattened())
     }
@@ -60,8 +77,15 @@ pub fn mean_value(pixels: &[[f32; 3]]) -> f64 {
     sum(channels.iter().map(|&c| f64::from(c))) / channels.len() as f64
 }
 
-/// Errors of one image.
-pub fn errors(image: &Image, reference: &ReferenceImages, reference_id: &str, metrics_algorithm: u32) -> ImageErrors {
+/// Errors of one image; `exposure` is that of its scene.
+pub fn errors(
+    image: &Image,
+    reference: &ReferenceImages,
+    reference_id: &str,
+    metrics_algorithm: u32,
+    exposure: f32,
+) -> ImageErrors {
+    let flip = reference.flip(image, exposure);
     let t = image.pixels.as_flattened();
     let r = reference.mean.as_flattened();
     let [r1, r2] = reference.flat();
@@ -74,6 +98,8 @@ pub fn errors(image: &Image, reference: &ReferenceImages, reference_id: &str, me
         mae: image_error::mae(t, r),
         bias: image_error::bias(t, r),
         error_autocorrelation: autocorrelation(image, reference),
+        flip: Some(flip.mean),
+        flip_weighted_median: Some(flip.weighted_median),
     }
 }
 
@@ -141,7 +167,7 @@ mod tests {
         assert_eq!(reference.noise_mse(), 0.0);
         assert_eq!(reference.mean_value(), 1.0);
         let image = Image { width: 2, height: 1, pixels: vec![[1.5, 2.0, 3.0], [0.0, -0.5, 0.0]] };
-        let e = errors(&image, &reference, "r", 1);
+        let e = errors(&image, &reference, "r", 1, 3.0);
         // Two differences of ±1/2 among six channels.
         assert!((e.mse - 0.5 / 6.0).abs() < 1e-16 && e.mse == e.mse_unbiased && e.bias == 0.0, "{e:?}");
     }

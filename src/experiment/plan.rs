@@ -5,6 +5,7 @@
 //! sampler, the spp and the replicate. No list position goes into either, so adding a sampler, a scene, an spp or a
 //! replicate leaves every existing image as it is.
 
+mod predictions;
 mod references;
 mod variants;
 
@@ -149,6 +150,25 @@ pub struct PointsWork {
     pub metrics: Vec<String>,
 }
 
+/// Variances of single pixels under one sampler at one count.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PredictionWork {
+    /// Scene name.
+    pub scene: String,
+    /// Sampler in canonical form.
+    pub sampler: String,
+    /// Samples per pixel.
+    pub spp: Count,
+    /// What all randomisations are derived from.
+    pub seed: u64,
+    /// Image size.
+    pub size: Size,
+    /// Columns and rows.
+    pub pixels: Vec<[u32; 2]>,
+    /// Randomisations to measure.
+    pub seeds: u32,
+}
+
 /// What an item does.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Work {
@@ -160,6 +180,8 @@ pub enum Work {
     Ensemble(EnsembleWork),
     /// Measures one point set.
     Points(PointsWork),
+    /// Predicts and measures variances of pixels.
+    Prediction(PredictionWork),
 }
 
 /// One item of a plan.
@@ -185,6 +207,7 @@ impl WorkItem {
             Work::Reference(_) => Kind::Reference,
             Work::Ensemble(_) => Kind::Ensemble,
             Work::Points(_) => Kind::Points,
+            Work::Prediction(_) => Kind::Prediction,
         }
     }
 
@@ -194,6 +217,7 @@ impl WorkItem {
             Work::Image(work) => Some(&work.sampler),
             Work::Ensemble(work) => Some(&work.sampler),
             Work::Points(work) => Some(&work.sampler),
+            Work::Prediction(work) => Some(&work.sampler),
             Work::Reference(ReferenceWork { source: ReferenceSource::Halves { sampler, .. }, .. }) => Some(sampler),
             Work::Reference(_) => None,
         }
@@ -204,6 +228,7 @@ impl WorkItem {
         match &self.work {
             Work::Image(work) => Some(work.seed),
             Work::Points(work) => Some(work.seed),
+            Work::Prediction(work) => Some(work.seed),
             Work::Reference(_) | Work::Ensemble(_) => None,
         }
     }
@@ -262,6 +287,7 @@ impl WorkItem {
                 let way = way(work.estimator, work.variant);
                 format!("{} {} {} spp ensemble{way}", work.scene, work.sampler, work.spp.asked)
             }
+            Work::Prediction(work) => format!("{} {} {} spp prediction", work.scene, work.sampler, work.spp.asked),
             Work::Points(work) => format!("{} {} points replicate {}", work.sampler, work.n.asked, work.replicate),
         }
     }
@@ -309,6 +335,14 @@ impl Plan {
     /// The item with this id.
     pub fn position(&self, id: &str) -> Option<usize> {
         self.positions.get(id).copied()
+    }
+
+    /// Exposure at which a scene is looked at.
+    ///
+    /// # Panics
+    /// Where the plan has no such scene.
+    pub fn exposure(&self, scene: &str) -> f32 {
+        self.scenes.iter().find(|facts| facts.name == scene).expect("items are of the plan's scenes").exposure
     }
 
     /// What the experiment calls a sampler.
@@ -359,7 +393,7 @@ impl Plan {
         let item = &self.items[position];
         let pilots = |id: &str| self.growth(id).into_iter().flat_map(|growth| growth.pilots.iter().map(String::as_str));
         match &item.work {
-            Work::Points(_) => Vec::new(),
+            Work::Points(_) | Work::Prediction(_) => Vec::new(),
             Work::Reference(_) => self.reference_images(&item.id).into_iter().chain(pilots(&item.id)).collect(),
             Work::Image(work) => {
                 let decides = work.batch.as_ref().map(|batch| &batch.reference_id);
@@ -424,6 +458,7 @@ pub fn plan(experiment: &Experiment, backend: &dyn Backend) -> Result<Plan> {
         let probed = if is_probed { probed.as_slice() } else { &[] };
         planner.add_statistics(scene, experiment.size.of(name, scene.size), &samplers, probed);
     }
+    planner.add_predictions()?;
     for pictures in &experiment.pictures {
         for (_, scene) in experiment.scenes.iter().zip(&scenes).filter(|(name, _)| **name == pictures.scene) {
             planner.add_pictures(scene, pictures, &samplers);
@@ -622,6 +657,7 @@ impl Planner<'_> {
                 MadeWith { sampler: Some(self.backend.algorithms(&work.sampler).sampler), ..MadeWith::default() }
             }
             Work::Image(work) => rendered(&work.scene, &work.sampler),
+            Work::Prediction(work) => rendered(&work.scene, &work.sampler),
             Work::Ensemble(work) => rendered(&work.scene, &work.sampler),
             Work::Reference(ReferenceWork { scene, source: ReferenceSource::Halves { sampler, .. }, .. }) => {
                 rendered(scene, sampler)

@@ -17,6 +17,7 @@ use super::identity::{ID_LENGTH, pixel_hash};
 use super::lines::{line, lines, sound_lines};
 use crate::error::{Error, Result};
 use crate::film::{Image, read_exr};
+pub use crate::stats::ErrorSpectrum;
 use crate::stats::Estimate;
 
 /// Version of the row format, field `schema`.
@@ -114,6 +115,8 @@ pub enum Kind {
     Picture,
     /// One of the four pictures of the sheet's Figure 1.
     Stage,
+    /// The variance of single pixels, predicted and measured.
+    Prediction,
 }
 
 /// The kind as written in rows.
@@ -126,6 +129,7 @@ pub fn kind_name(kind: Kind) -> &'static str {
         Kind::Ensemble => "ensemble",
         Kind::Picture => "picture",
         Kind::Stage => "stage",
+        Kind::Prediction => "prediction",
     }
 }
 
@@ -157,6 +161,13 @@ pub struct ImageErrors {
     pub bias: f64,
     /// Correlation of the error between neighbouring pixels; null where the error is not above the reference's noise.
     pub error_autocorrelation: Option<f64>,
+    /// FLIP, how different it looks from the reference at the scene's exposure, 0 to 1, mean over the pixels: perceptual, saturates,
+    /// and no estimate of any of the above. Rows of earlier versions do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flip: Option<f64>,
+    /// The value below which pixels make up half of the sum.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flip_weighted_median: Option<f64>,
 }
 
 /// A difference of more than this share of the mean is called a jump; f32 images that differ by roundings differ by 1e−6.
@@ -312,6 +323,12 @@ pub struct EnsembleRow {
     pub bias: Estimate,
     /// Correlation of the error between neighbouring pixels; null where a replicate's is not defined.
     pub error_autocorrelation: Option<Estimate>,
+    /// Mean FLIP of the replicates at the scene's exposure; rows of earlier versions do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flip: Option<Estimate>,
+    /// Power of the error images by frequency, where they were made plainly.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error_spectrum: Option<Box<ErrorSpectrum>>,
     /// Ids of the replicates.
     pub members: Vec<String>,
     /// What it was made with; rows of earlier versions do not say.
@@ -348,6 +365,58 @@ pub struct PointsRow {
     pub made_with: Option<MadeWith>,
 }
 
+/// The variance of one pixel between randomisations; of the mean of the channels, squared radiance.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PixelVariance {
+    /// Column and row from the upper left.
+    pub pixel: [u32; 2],
+    /// What it shows, radiance.
+    pub mean: f64,
+    /// Variance of one uniform sample.
+    pub one_sample: f64,
+    /// Variance of the mean of all samples, predicted from spectra ([`pixel_variance`](crate::stats::pixel_variance)).
+    pub predicted: f64,
+    /// The part of it that stands for frequencies that were not summed.
+    pub rest: f64,
+    /// The same measured; the interval is that of χ², which holds for normal values.
+    pub measured: Estimate,
+}
+
+/// Kind `prediction`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PredictionRow {
+    /// Row format, [`SCHEMA`].
+    pub schema: u32,
+    /// The item.
+    pub id: String,
+    /// `prediction`.
+    pub kind: Kind,
+    /// Scene name.
+    pub scene: String,
+    /// Sampler in canonical form.
+    pub sampler: String,
+    /// Samples per pixel.
+    pub spp: Count,
+    /// What all its randomisations are derived from.
+    #[serde(serialize_with = "decimal", deserialize_with = "from_decimal")]
+    pub seed: u64,
+    /// Image size.
+    pub size: Size,
+    /// Randomisations that were measured.
+    pub seeds: u32,
+    /// Whether the prediction is exact for the sampler: uniform points, or a set that is shifted as a whole.
+    pub is_stationary: bool,
+    /// Measured by predicted variance, each summed over the pixels; 95 % jackknife interval over the randomisations.
+    pub ratio: Estimate,
+    /// Share of the prediction that stands for frequencies that were not summed.
+    pub rest: f64,
+    /// Pixel by pixel.
+    pub pixels: Vec<PixelVariance>,
+    /// What it was made with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_with: Option<MadeWith>,
+}
+
 /// One line of `results.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
@@ -360,6 +429,8 @@ pub enum Row {
     Ensemble(EnsembleRow),
     /// Kind `points`.
     Points(PointsRow),
+    /// Kind `prediction`.
+    Prediction(PredictionRow),
 }
 
 /// What every row starts with.
@@ -382,6 +453,7 @@ impl Row {
         }
         match head.kind {
             Kind::Points => serde_json::from_str(line).map(Self::Points).map_err(bad),
+            Kind::Prediction => serde_json::from_str(line).map(Self::Prediction).map_err(bad),
             Kind::Reference => serde_json::from_str(line).map(Self::Reference).map_err(bad),
             Kind::Ensemble => serde_json::from_str(line).map(Self::Ensemble).map_err(bad),
             Kind::ReferenceHalf | Kind::Stage => serde_json::from_str(line).map(Self::Image).map_err(bad),
@@ -405,6 +477,7 @@ impl Row {
             Self::Reference(row) => &row.id,
             Self::Ensemble(row) => &row.id,
             Self::Points(row) => &row.id,
+            Self::Prediction(row) => &row.id,
         }
     }
 
@@ -415,6 +488,7 @@ impl Row {
             Self::Reference(row) => row.kind,
             Self::Ensemble(row) => row.kind,
             Self::Points(row) => row.kind,
+            Self::Prediction(row) => row.kind,
         }
     }
 
@@ -434,6 +508,7 @@ impl Row {
             Self::Reference(row) => row.made_with.as_ref(),
             Self::Ensemble(row) => row.made_with.as_ref(),
             Self::Points(row) => row.made_with.as_ref(),
+            Self::Prediction(row) => row.made_with.as_ref(),
         }
     }
 
@@ -443,6 +518,7 @@ impl Row {
             Self::Image(row) => Some(&row.scene),
             Self::Reference(row) => Some(&row.scene),
             Self::Ensemble(row) => Some(&row.scene),
+            Self::Prediction(row) => Some(&row.scene),
             Self::Points(_) => None,
         }
     }
@@ -454,6 +530,7 @@ impl Row {
             Self::Reference(row) => &mut row.made_with,
             Self::Ensemble(row) => &mut row.made_with,
             Self::Points(row) => &mut row.made_with,
+            Self::Prediction(row) => &mut row.made_with,
         };
         *field = Some(made_with.clone());
     }
@@ -464,7 +541,7 @@ impl Row {
             Self::Image(ImageRow { names, .. })
             | Self::Ensemble(EnsembleRow { names, .. })
             | Self::Points(PointsRow { names, .. }) => *names = now.to_vec(),
-            Self::Reference(_) => {}
+            Self::Reference(_) | Self::Prediction(_) => {}
         }
     }
 }
@@ -555,6 +632,8 @@ mod tests {
                 mae: 5e-324,
                 bias: -0.0,
                 error_autocorrelation: None,
+                flip: None,
+                flip_weighted_median: None,
             }),
         })
     }

@@ -118,7 +118,7 @@ fn parts(plan: &Plan, position: usize) -> Vec<&str> {
             Some(growth) => growth.batches.iter().flatten().map(String::as_str).collect(),
             None => plan.reference_images(&item.id).to_vec(),
         },
-        Work::Image(_) | Work::Points(_) => Vec::new(),
+        Work::Image(_) | Work::Points(_) | Work::Prediction(_) => Vec::new(),
     }
 }
 

@@ -17,6 +17,7 @@
 //! | `points` | optional: `{"n", "metrics", "replicates"}`: point-set metrics of the same samplers |
 //! | `pictures` | optional: `{"scene", "size", "spp", "reference_spp"}`, or a list of these: images to look at; `spp` is a count or a ladder of counts, `reference_spp` defaults to the reference's |
 //! | `stability` | optional: `{"spp", "scenes", "samplers"}`: a sample more or less, the spread of replicates, other units of length, two passes, all against `spp` samples per pixel; `scenes` and `samplers` default to all of the experiment |
+//! | `prediction` | optional: `{"scene", "samplers", "spp", "pixels", "seeds"}`: the variance of single pixels, predicted from spectra and measured over `seeds` randomisations, in a scene whose only decision is that of the pixel; `pixels` are `[column, row]` |
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
@@ -28,6 +29,8 @@ pub use super::entry::SamplerEntry;
 use super::entry::sampler;
 pub use super::pictures::Pictures;
 use super::pictures::{one_or_more, pictures};
+pub use super::prediction::Prediction;
+use super::prediction::prediction;
 use crate::error::{Error, Result};
 use crate::scene::json::{self, Item, Value, suggestion};
 
@@ -75,6 +78,9 @@ pub struct Experiment {
     /// What should make no difference, made to see whether it does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stability: Option<Stability>,
+    /// Which variances of single pixels to predict and to measure.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prediction: Option<Prediction>,
     /// The file, for messages; no part of the experiment.
     #[serde(skip)]
     pub place: String,
@@ -229,6 +235,7 @@ impl Experiment {
         let points = fields.opt("points", |item| points(&item))?;
         let pictures = fields.or("pictures", Vec::new(), |item| pictures(&item, &scenes, reference.spp))?;
         let stability = fields.opt("stability", |item| stability(&item, &scenes, &samplers))?;
+        let prediction = fields.opt("prediction", |item| prediction(&item, &scenes))?;
         fields.finish()?;
         Ok(Self {
             name,
@@ -243,6 +250,7 @@ impl Experiment {
             points,
             pictures,
             stability,
+            prediction,
             place: place.to_owned(),
         })
     }
@@ -261,7 +269,7 @@ fn name(item: Item) -> Result<String> {
 }
 
 /// A list of at least one entry, each once.
-fn list<'a, T: std::hash::Hash + Eq + Clone>(
+pub(super) fn list<'a, T: std::hash::Hash + Eq + Clone>(
     item: &Item<'a>,
     what: &str,
     read: impl Fn(&Item<'a>) -> Result<T>,

@@ -140,6 +140,7 @@ pub(super) fn is_result_of(row: &Row, item: &WorkItem) -> bool {
         (Row::Reference(row), Work::Reference(_)) => row.metrics_algorithm == metrics,
         (Row::Ensemble(row), Work::Ensemble(_)) => row.metrics_algorithm == metrics,
         (Row::Points(row), Work::Points(_)) => row.metrics_algorithm == metrics,
+        (Row::Prediction(_), Work::Prediction(_)) => true,
         _ => false,
     };
     is_measured_so && altered(row, item).is_none()
@@ -190,6 +191,15 @@ pub(super) fn altered(row: &Row, item: &WorkItem) -> Option<&'static str> {
             ("n", row.n == work.n),
             ("replicate", row.replicate == work.replicate),
             ("seed", row.seed == work.seed),
+        ],
+        (Row::Prediction(row), Work::Prediction(work)) => vec![
+            ("scene", row.scene == work.scene),
+            ("sampler", row.sampler == work.sampler),
+            ("spp", row.spp == work.spp),
+            ("seed", row.seed == work.seed),
+            ("size", row.size == work.size),
+            ("seeds", row.seeds == work.seeds),
+            ("pixels", row.pixels.iter().map(|found| found.pixel).eq(work.pixels.iter().copied())),
         ],
         _ => vec![("kind", false)],
     };
@@ -352,7 +362,7 @@ fn needed_as_grown<'a>(plan: &'a Plan, standing: &Standing, position: usize) -> 
     let reference_id = match &plan.items[position].work {
         Work::Image(work) => work.reference_id.as_deref(),
         Work::Ensemble(work) => Some(work.reference_id.as_str()),
-        Work::Reference(_) | Work::Points(_) => None,
+        Work::Reference(_) | Work::Points(_) | Work::Prediction(_) => None,
     };
     if let Some(id) = reference_id
         && let Some((growth, known)) = plan.growth(id).zip(batches(plan, &standing.rows, id))

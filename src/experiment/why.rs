@@ -102,6 +102,7 @@ pub fn slot_of_item(item: &WorkItem) -> String {
             image_slot(kind, &w.scene, &w.sampler, (w.spp.asked, 0, 0), &w.size, &way)
         }
         Work::Points(w) => format!("{kind} {} {} {} {}", w.sampler, w.n.asked, w.replicate, w.seed),
+        Work::Prediction(w) => format!("{kind} {} {} {}", w.scene, w.sampler, w.spp.asked),
     }
 }
 
@@ -119,6 +120,7 @@ pub fn slot_of_row(row: &Row) -> String {
             image_slot(kind, &r.scene, &r.sampler, (r.spp.asked, 0, 0), &r.size, &way)
         }
         Row::Points(r) => format!("{kind} {} {} {} {}", r.sampler, r.n.asked, r.replicate, r.seed),
+        Row::Prediction(r) => format!("{kind} {} {} {}", r.scene, r.sampler, r.spp.asked),
     }
 }
 
@@ -186,5 +188,6 @@ fn metrics_algorithm(row: &Row) -> Option<u32> {
         Row::Reference(row) => Some(row.metrics_algorithm),
         Row::Ensemble(row) => Some(row.metrics_algorithm),
         Row::Points(row) => Some(row.metrics_algorithm),
+        Row::Prediction(_) => None,
     }
 }

@@ -43,6 +43,7 @@ pub(super) fn read(reader: impl BufRead + Seek, about: &About, layer: Option<&st
         width,
         height,
         pixels,
+        is_display: false,
         corner: Some((along(data.x(), display.x()), along(data.y(), display.y()))),
         provenance: provenance(header),
         notes: Vec::new(),

@@ -43,7 +43,7 @@ pub(super) fn read(mut reader: impl BufRead, about: &About) -> Result<Picture> {
         1.0 => Vec::new(),
         factor => vec![format!("PFM: all values are multiplied by the scale {factor} of its header")],
     };
-    Ok(Picture { width, height, pixels, corner: None, provenance: Vec::new(), notes })
+    Ok(Picture { width, height, pixels, corner: None, is_display: false, provenance: Vec::new(), notes })
 }
 
 /// Refuses a scale that makes finite samples too large for 32 bits: their squares, and what is computed of those, would leave `f64`.

@@ -25,6 +25,8 @@ pub struct Picture {
     pub pixels: Vec<[f64; 3]>,
     /// Where the pixels' corner lies in the whole image, where the file says so: OpenEXR's data in its display window.
     pub corner: Option<(i64, i64)>,
+    /// Whether the file held display values, as a PNG does: the pixels are the light of a screen, 0 to 1, and no radiance.
+    pub is_display: bool,
     /// The `sampler_lab.*` attributes of an OpenEXR file of ours, sorted; empty otherwise.
     pub provenance: Vec<(String, String)>,
     /// What its user should know: what was decoded, dropped or applied.

@@ -49,7 +49,7 @@ pub(super) fn read(mut reader: impl BufRead + Seek, about: &About) -> Result<Pic
     if !is_opaque {
         notes.push("PNG: its alpha is not applied, though some pixels are transparent".to_owned());
     }
-    Ok(Picture { width, height, pixels, corner: None, provenance: Vec::new(), notes })
+    Ok(Picture { width, height, pixels, corner: None, is_display: true, provenance: Vec::new(), notes })
 }
 
 /// What the chunks before the pixels say of the values' meaning; the decoder at hand does not tell.

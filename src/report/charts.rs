@@ -17,6 +17,7 @@ use super::pareto::{Trial, pareto_chart};
 use super::pictures::{NamedPoints, point_set_contact_sheet};
 use super::plots::{Datum, Floor, Guide, Plot, Series, loglog_chart, small_multiples};
 use super::provenance;
+use super::sections::pattern_spp;
 use super::shares::{Share, SharePanel, share_chart};
 use super::stability::{Against, Stretch, count_against, passes_against};
 use super::summarise::{Subject, Summary};
@@ -154,6 +155,40 @@ fn panel(summary: &Summary, scene: usize, samplers: &[usize], words: &str) -> Pl
         guides: vec![guide(-0.5, "slope −1/2"), guide(-1.0, "slope −1")],
         floor: floor.map(|value| Floor { value, label: "reference noise".to_owned() }),
     }
+}
+
+/// Power of the error images by frequency at the count that patterns are judged at, a panel a scene.
+pub fn error_spectrum(summary: &Summary) -> Option<Figure> {
+    let spp = pattern_spp(summary)?;
+    let line = |scene: usize, sampler: usize| {
+        let cell = summary.cell(scene, sampler, spp).filter(|cell| cell.mse.value > 0.0)?;
+        let (found, mse) = (cell.error_spectrum.as_ref()?, cell.mse.value);
+        let band = |ring: usize| Some((found.low.as_ref()?.get(ring)? / mse, found.high.as_ref()?.get(ring)? / mse));
+        let rings = found.frequency.iter().zip(&found.power).enumerate();
+        let points = rings.map(|(ring, (&x, power))| Datum {
+            x,
+            y: power / mse,
+            interval: band(ring),
+            is_pale: cell.is_reference_limited,
+        });
+        Some(series(summary, sampler, points.collect()))
+    };
+    let panels: Vec<Plot> = (0..summary.scenes.len())
+        .map(|scene| Plot {
+            title: summary.scenes[scene].name.clone(),
+            series: (0..summary.samplers.len()).filter_map(|sampler| line(scene, sampler)).collect(),
+            guides: Vec::new(),
+            floor: Some(Floor { value: 1.0, label: "independent pixels".to_owned() }),
+        })
+        .collect();
+    if panels.iter().all(|plot| plot.series.is_empty()) {
+        return None;
+    }
+    let subtitle = format!("{}, bands: 10 % to 90 % of them; flat: pixels err independently", replicates(summary));
+    let axes = ["spatial frequency (cycles per pixel)", "power / mean square error"];
+    let title = format!("Error of the image by frequency at {spp} spp");
+    let frame = Frame { x_ticks: vec![0.02, 0.05, 0.1, 0.2, 0.5], ..frame(summary, &title, &subtitle, axes) };
+    Some(small_multiples(&frame, &panels, summary.scenes.len().clamp(1, 3)))
 }
 
 /// bias² and variance of every sampler at the most samples per pixel, a group a scene.

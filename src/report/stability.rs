@@ -530,6 +530,8 @@ mod tests {
             variance: None,
             bias: mse,
             error_autocorrelation: None,
+            flip: None,
+            error_spectrum: None,
             replicate_mse: Vec::new(),
             replicate_mean: vec![2.0; 8],
             pixels: Vec::new(),

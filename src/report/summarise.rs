@@ -10,8 +10,8 @@ mod variants;
 use std::collections::HashMap;
 
 use crate::experiment::results::{
-    About, Count, EnsembleRow, Estimator, ImageRow, Kind, PointsRow, ReferenceRow, Row, Timing, TwinDifference,
-    Variant, is_enough,
+    About, Count, EnsembleRow, ErrorSpectrum, Estimator, ImageRow, Kind, PointsRow, PredictionRow, ReferenceRow, Row,
+    Timing, TwinDifference, Variant, is_enough,
 };
 use crate::experiment::spec::Experiment;
 use crate::sampling::{Decision, Points, Preset};
@@ -57,6 +57,8 @@ pub struct Summary {
     pub speeds: Vec<Speed>,
     /// Sets that are not compared in a scene: scene, sampler, and the sampler that means the same there.
     pub left_out: Vec<(usize, usize, usize)>,
+    /// Variances of pixels, predicted and measured.
+    pub predictions: Vec<PredictionRow>,
     /// What is not there, in words.
     pub missing: Vec<String>,
 }
@@ -122,6 +124,10 @@ pub struct Cell {
     pub bias: Estimate,
     /// Correlation of the error between neighbouring pixels.
     pub error_autocorrelation: Option<Estimate>,
+    /// Mean FLIP of the replicates: how different they look, no estimate of the errors above.
+    pub flip: Option<Estimate>,
+    /// Power of the error images by frequency.
+    pub error_spectrum: Option<ErrorSpectrum>,
     /// Unbiased mean square error of each replicate whose row is there.
     pub replicate_mse: Vec<f64>,
     /// Mean radiance of each replicate whose row is there.
@@ -354,6 +360,7 @@ pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
         pictured: Vec::new(),
         speeds: Vec::new(),
         left_out: Vec::new(),
+        predictions: Vec::new(),
         missing: Vec::new(),
     };
     summary.left_out = left_out(&summary, about);
@@ -364,6 +371,7 @@ pub fn summarise(rows: &[Row], timings: &[Timing], about: &About) -> Summary {
     index.add_points(&mut summary);
     index.add_pictures(&mut summary, timings);
     index.add_speeds(&mut summary, timings);
+    index.add_predictions(&mut summary);
     summary
 }
 
@@ -392,6 +400,7 @@ struct Index<'a> {
     /// [`Summary::reference_share`].
     share: f64,
     points: HashMap<(&'a str, u32), Vec<&'a PointsRow>>,
+    predictions: Vec<&'a PredictionRow>,
     pictures: Vec<&'a ImageRow>,
     stages: Vec<&'a ImageRow>,
 }
@@ -405,6 +414,7 @@ impl<'a> Index<'a> {
             primary: experiment.estimator.primary(),
             share: reference_share(experiment),
             points: HashMap::new(),
+            predictions: Vec::new(),
             pictures: Vec::new(),
             stages: Vec::new(),
         };
@@ -421,6 +431,7 @@ impl<'a> Index<'a> {
                     sets.retain(|other| other.replicate != row.replicate);
                     sets.push(row);
                 }
+                Row::Prediction(row) => index.predictions.push(row),
                 Row::Image(row) => {
                     index.images.insert(&row.id, row);
                     match row.kind {
@@ -471,6 +482,19 @@ impl<'a> Index<'a> {
             pixels: size.pixels(),
             reference: by_id.or(by_size.first().copied()).cloned(),
         }
+    }
+
+    /// Predictions, those that are exact first; the others are missing.
+    fn add_predictions(&self, summary: &mut Summary) {
+        let Some(asked_for) = &summary.about.experiment.prediction else { return };
+        let planned = asked_for.samplers.len() * asked_for.spp.len();
+        let mut found: Vec<PredictionRow> = self.predictions.iter().map(|&row| row.clone()).collect();
+        found.sort_by_key(|row| (!row.is_stationary, row.sampler.clone(), row.spp.asked));
+        found.dedup_by(|a, b| a.id == b.id);
+        if found.len() < planned {
+            summary.missing.push(format!("{} of {planned} predicted variances", planned - found.len()));
+        }
+        summary.predictions = found;
     }
 
     /// One cell for each ensemble that is there; the others are missing.
@@ -532,6 +556,8 @@ impl<'a> Index<'a> {
             bias: known(row.bias),
             // One image's correlation has no spread over replicates; of a fixed sampler it is all there is.
             error_autocorrelation: row.error_autocorrelation,
+            flip: row.flip,
+            error_spectrum: row.error_spectrum.as_deref().cloned(),
             replicate_mse: members.iter().filter_map(|m| m.errors.as_ref()).map(|e| e.mse_unbiased).collect(),
             replicate_mean: members.iter().map(|m| m.mean).collect(),
             pixels: members.iter().map(|m| m.pixels.clone()).collect(),

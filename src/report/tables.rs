@@ -15,7 +15,11 @@ pub fn summary_csv(summary: &Summary) -> String {
     for metric in ["rmse", "mse", "rel_mse", "bias2", "variance", "bias", "error_autocorrelation"] {
         let _ = write!(text, ",{metric},{metric}_low,{metric}_high");
     }
-    text += ",reference_noise_mse,reference_limited\n";
+    text += ",reference_noise_mse,reference_limited";
+    for metric in ["flip", "low_frequency_share", "blur_1", "blur_2"] {
+        let _ = write!(text, ",{metric},{metric}_low,{metric}_high");
+    }
+    text += ",white_low_frequency_share,p_white\n";
     for cell in &summary.cells {
         text += &cell_line(summary, cell);
     }
@@ -48,7 +52,23 @@ fn cell_line(summary: &Summary, cell: &Cell) -> String {
         line += &estimate_fields(estimate);
     }
     let noise = scene.reference.as_ref().map(|reference| reference.noise_mse.to_string());
-    let _ = writeln!(line, ",{},{}", noise.unwrap_or_default(), cell.is_reference_limited);
+    let _ = write!(line, ",{},{}", noise.unwrap_or_default(), cell.is_reference_limited);
+    let spectrum = cell.error_spectrum.as_ref();
+    let [share, blur_1, blur_2] = [
+        spectrum.and_then(|found| found.low_share),
+        spectrum.and_then(|found| found.blur_1),
+        spectrum.and_then(|found| found.blur_2),
+    ];
+    for estimate in [cell.flip, share, blur_1, blur_2] {
+        line += &estimate_fields(estimate);
+    }
+    let field = |number: Option<f64>| number.map(|number| number.to_string()).unwrap_or_default();
+    let _ = writeln!(
+        line,
+        ",{},{}",
+        field(spectrum.map(|found| found.white_low_share)),
+        field(spectrum.and_then(|found| found.p_white))
+    );
     line
 }
 

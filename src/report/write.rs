@@ -109,6 +109,7 @@ fn draw(dir: &Path, summary: &Summary) -> Result<Figures> {
     pen.raster("point-sets", charts::point_sets(summary).ok_or_else(no_rows))?;
     pen.raster("failures", charts::failures(summary).ok_or_else(no_rows))?;
     pen.chart("discrepancy", charts::discrepancy(summary))?;
+    pen.chart("error-spectrum", charts::error_spectrum(summary))?;
     pen.chart("convergence", charts::convergence(summary))?;
     pen.chart("bias-and-variance", charts::bias_and_variance(summary))?;
     pen.chart("stability", charts::stability(summary))?;

@@ -72,11 +72,15 @@ struct Focus {
 /// Largest extent of a scene and distance of its camera: products of three coordinates must stay finite in f32.
 const MAX_REACH: f32 = 1e12;
 
+/// Largest ratio of lens radius to focal depth: a ray from the lens's rim to the point in focus is that much steeper than any
+/// other, and the square of it must stay finite in f32 with room to spare.
+const MAX_STEEPNESS: f32 = 1e12;
+
 impl Scene {
     /// Compiles a loaded scene for an image of `size` (columns, rows).
     ///
     /// # Errors
-    /// Kind `Input` where coordinates are too large for single precision.
+    /// Kind `Input` where coordinates or the lens are too large for single precision, or the focal depth too small beside the lens.
     pub fn new(config: &SceneConfig, mesh: Mesh, size: (u32, u32), stage: Stage) -> Result<Self> {
         let reach = reach(&mesh, config.camera.pos);
         check_reach(reach)?;
@@ -108,7 +112,23 @@ impl Scene {
         let mut scene =
             Self { mesh, faces, accel, camera, lights, estimator: config.estimator, layout, warnings, focus };
         scene.refocus();
+        scene.check_lens()?;
         Ok(scene)
+    }
+
+    /// Whether single precision can hold the lens's rays: else their directions would overflow, meet nothing, and the picture be black.
+    fn check_lens(&self) -> Result<()> {
+        let Aperture::ThinLens { radius, focal_depth, .. } = self.camera.aperture else { return Ok(()) };
+        if 2.0 * radius > MAX_REACH {
+            let what = format!("expected a length up to {:e}, found {radius:e}", 0.5 * MAX_REACH);
+            return Err(Error::input("camera.lens_radius", what));
+        }
+        if radius / focal_depth > MAX_STEEPNESS {
+            let least = radius / MAX_STEEPNESS;
+            let what = format!("expected at least {least:e} with a lens of radius {radius:e}, found {focal_depth:e}");
+            return Err(Error::input("camera.focal_depth", what));
+        }
+        Ok(())
     }
 
     /// Changes the image's size; with auto focus on, the plane of focus is found anew.

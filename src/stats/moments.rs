@@ -35,7 +35,7 @@ impl Estimate {
 }
 
 /// The number nearest to `x` among those of 6 significant decimal digits.
-fn round_6(x: f64) -> f64 {
+pub(super) fn round_6(x: f64) -> f64 {
     // Decimal text is exact in both directions, so no platform differs; a number's own text always reads.
     format!("{x:.5e}").parse().unwrap_or(x)
 }

@@ -11,6 +11,7 @@ mod domains;
 mod metrics;
 mod net_counts;
 mod numbers;
+mod rendering;
 mod room;
 mod scrambles;
 mod sharing;
@@ -27,6 +28,7 @@ pub fn checks() -> Vec<Check> {
         net_counts::checks(),
         domains::checks(),
         scrambles::checks(),
+        rendering::checks(),
         metrics::checks(),
     ]
     .concat()

@@ -86,7 +86,7 @@ impl AxisLaw {
             cells,
         };
         match (spec.points, axis) {
-            _ if spec.points == Points::Stratified && one_d || spec.sheet_1d && one_d => strata(|i, _| i, n, n),
+            _ if one_d && (spec.points == Points::Stratified || spec.sheet_1d) => strata(|i, _| i, n, n),
             (Points::Stratified, _) => {
                 let (rows, columns) = factor_pair(n).expect("a count that the sampler takes");
                 if axis == 0 { strata(|i, c| i % c, columns, columns) } else { strata(|i, c| i / c, columns, rows) }
@@ -360,6 +360,27 @@ pub fn owen_diagonal(m: u32) -> f64 {
     (one_axis + above + at_once) * power(2, m)
 }
 
+/// Points in steps of 1/n, what a shift by so many steps makes of one, and whether the axis is shifted at all.
+type OnGrid = (Vec<u32>, fn(u32, u32) -> u32, bool);
+
+/// An axis that is fixed or shifted, in steps of 1/n; `None` where it has another law or a point is off the grid.
+fn on_grid(law: &AxisLaw, n: u32) -> Option<OnGrid> {
+    let fractions = |points: &[u32]| points.iter().map(|&f| f64::from(f) / SCALE).collect();
+    let points: Vec<f64> = match law {
+        AxisLaw::Fixed(points) => points.clone(),
+        AxisLaw::Xor(points) | AxisLaw::Shift(points) => fractions(points),
+        _ => return None,
+    };
+    let shifted: fn(u32, u32) -> u32 = match law {
+        AxisLaw::Xor(_) => |p, w| p ^ w,
+        AxisLaw::Shift(_) => u32::wrapping_add,
+        _ => |p, _| p,
+    };
+    let moves = !matches!(law, AxisLaw::Fixed(_));
+    let steps: Vec<f64> = points.iter().map(|p| p * f64::from(n)).collect();
+    steps.iter().all(|p| p.fract() == 0.0).then(|| (steps.iter().map(|&p| p as u32).collect(), shifted, moves))
+}
+
 /// Error of the mean of 1[y > x] over n = 2ᵐ points whose coordinates are multiples of 1/n, each axis fixed, digitally or
 /// toroidally shifted: all n² shifts of the top m digits. The digits below are the same in all points of an axis: two
 /// numbers that tie in the top digits are told apart by them, all ties alike, either way equally often; a fixed axis has
@@ -369,17 +390,7 @@ pub fn owen_diagonal(m: u32) -> f64 {
 pub fn grid_diagonal(x: &AxisLaw, y: &AxisLaw) -> Option<Error> {
     let n = x.n() as u32;
     let m = n.is_power_of_two().then(|| n.trailing_zeros())?;
-    let grid = |law: &AxisLaw| -> Option<(Vec<u32>, fn(u32, u32) -> u32, bool)> {
-        let (scaled, combine, shifts): (Vec<f64>, fn(u32, u32) -> u32, bool) = match law {
-            AxisLaw::Fixed(points) => (points.clone(), |p, _| p, false),
-            AxisLaw::Xor(p) => (p.iter().map(|&f| f64::from(f) / SCALE).collect(), |p, w| p ^ w, true),
-            AxisLaw::Shift(p) => (p.iter().map(|&f| f64::from(f) / SCALE).collect(), u32::wrapping_add, true),
-            _ => return None,
-        };
-        let scaled: Vec<f64> = scaled.iter().map(|p| p * f64::from(n)).collect();
-        scaled.iter().all(|p| p.fract() == 0.0).then(|| (scaled.iter().map(|&p| p as u32).collect(), combine, shifts))
-    };
-    let ((xs, of_x, x_moves), (ys, of_y, y_moves)) = (grid(x)?, grid(y)?);
+    let ((xs, of_x, x_moves), (ys, of_y, y_moves)) = (on_grid(x, n)?, on_grid(y, n)?);
     let is_group = |p: &[u32]| (0..m).all(|b| (0..n as usize).all(|i| p[i ^ 1 << b] == p[i] ^ p[1 << b]));
     let cosets = matches!((x, y), (AxisLaw::Xor(_), AxisLaw::Xor(_))) && is_group(&xs) && is_group(&ys);
     let (mut errors, mut squares, mut weight) = (0.0, 0.0, 0.0);
@@ -509,7 +520,7 @@ mod tests {
     fn the_step_of_two_shifted_numbers_is_a_probability_of_its_margins() {
         for differ in [0, 1, 1 << 31, 0x5555_5555, u32::MAX] {
             let p = xor_step(differ);
-            assert!(p <= FRAC_1_PI + 1e-9 && p >= 0.0, "{differ:x}: {p}");
+            assert!((0.0..=FRAC_1_PI + 1e-9).contains(&p), "{differ:x}: {p}");
         }
         assert!((xor_step(0) - FRAC_1_PI).abs() < 1e-9);
         // The other half of [0, 1): never both below 1/π < ½.

@@ -293,7 +293,7 @@ fn digits_are_nested(context: &Context) -> Finding {
                 let base = PRIMES[axis + if s.order == Order::Joint { first } else { 0 }];
                 let n = base.pow(2);
                 let values = &axes(s, &tickets, decision, n, context.seed)[axis];
-                let mut strata: Vec<u64> = values.iter().map(|&v| (u64::from(v) + 1) * u64::from(n) >> 32).collect();
+                let mut strata: Vec<u64> = values.iter().map(|&v| ((u64::from(v) + 1) * u64::from(n)) >> 32).collect();
                 strata.sort_unstable();
                 tally.fact(
                     format!("{s}: base {base} of the {}", decision.name()),

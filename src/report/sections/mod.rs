@@ -27,8 +27,10 @@ mod in_step;
 mod neighbours;
 mod opening;
 mod pictures;
+mod pixels;
 mod points;
 mod predicates;
+mod prediction;
 mod reference;
 mod scenes;
 mod shortcut;
@@ -41,6 +43,7 @@ use super::markdown::Page;
 use super::pairing::{self, Paired};
 use super::summarise::Summary;
 use super::write::{FigureState, Figures};
+pub use neighbours::pattern_spp;
 
 /// Names of sections that others link to.
 mod titles {
@@ -52,6 +55,7 @@ mod titles {
     pub const IDENTICAL: &str = "Identical";
     pub const CONVERGENCE: &str = "Convergence";
     pub const BIAS: &str = "Bias and variance";
+    pub const PREDICTION: &str = "Predicted pixel variance";
     pub const PICTURES: &str = "Pictures at equal samples and at equal time";
     pub const SPEED: &str = "Speed against accuracy";
     pub const FAILURES: &str = "Where methods fail";
@@ -110,10 +114,12 @@ pub fn report_with(summary: &Summary, figures: &Figures, measured: &Measurements
     points::within(summary, tests, &mut page);
     in_step::between_decisions(summary, measured, &mut page);
     neighbours::between_pixels(summary, &neighbours, &mut page);
+    pixels::spectra(summary, figures, &mut page);
     decisions::section(summary, figures, &mut page);
     identical::section(summary, &identity, &mut page);
     convergence::section(summary, figures, &mut page);
     convergence::bias_and_variance(summary, figures, &mut page);
+    prediction::section(summary, &mut page);
     pictures::strips(summary, figures, &mut page);
     speed::section(summary, figures, &mut page);
     shortcut::section(summary, &mut page);

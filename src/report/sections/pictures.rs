@@ -1,6 +1,7 @@
 //! Pictures: the four stages, strips with enlarged details at equal samples and at equal time, error maps.
 
 use crate::experiment::results::ImageRow;
+use crate::stats::flip::DEFAULT_PPD;
 
 use super::super::charts::of_scene;
 use super::super::markdown::{Page, figure_ref, link_to, table_ref};
@@ -109,9 +110,11 @@ fn at_equal_samples(summary: &Summary, set: &PictureSet, figures: &Figures, page
     let lines: Vec<Vec<String>> = shots.iter().map(|shot| shot_line(summary, shot)).collect();
     let caption = format!(
         "The pictures of `{scene}` at {asked} spp asked: samples taken, RMSE and mean radiance in W/(m² sr), correlation ρ of neighbouring pixels' errors \
-         (no unit); one image each."
+         (no unit), and FLIP: how different the picture looks from the reference at exposure {}, mean over its pixels, 0 to 1, on a screen of {DEFAULT_PPD:.0} pixels a degree. FLIP is perceptual: it saturates and depends on \
+         exposure and screen, and is no estimator of variance or of any error beside it. One image each.",
+        set.exposure
     );
-    let head = ["picture", "spp taken", "RMSE", "ρ of neighbours", "mean radiance", "row"];
+    let head = ["picture", "spp taken", "RMSE", "ρ of neighbours", "FLIP (perceptual)", "mean radiance", "row"];
     tabulate(page, &of_scene("pictures", scene), &caption, &head, &lines);
 }
 
@@ -130,6 +133,7 @@ fn shot_line(summary: &Summary, shot: &Shot) -> Vec<String> {
         shot.row.spp.taken.to_string(),
         rmse_words(&shot.row).unwrap_or("–".to_owned()),
         rho.map_or("–".to_owned(), signed),
+        shot.row.errors.as_ref().and_then(|errors| errors.flip).map_or("–".to_owned(), short),
         short(shot.row.mean),
         row(&shot.row.id),
     ]

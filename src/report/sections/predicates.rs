@@ -302,6 +302,8 @@ mod tests {
             variance: None,
             bias: none,
             error_autocorrelation: None,
+            flip: None,
+            error_spectrum: None,
             replicate_mse: Vec::new(),
             replicate_mean: Vec::new(),
             pixels: Vec::new(),

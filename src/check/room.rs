@@ -1,24 +1,31 @@
-//! Scenes built in memory, and replicates of their pixels.
-#![allow(dead_code, reason = "each test file compiles this module for itself and uses its own part of it")]
+//! Scenes built in memory, replicates of their pixels, and what the closed forms say about them: for checks and tests.
+//!
+//! All is grey. What a caller gets wrong here is an error of the program, so these functions panic where the product's return errors.
 
 use glam::{DVec3, Vec2, Vec3};
-use sampler_lab::analytic::{DiffusePlane, Penumbra, Pinhole, PolygonLight};
-use sampler_lab::film::Image;
-use sampler_lab::render::render;
-use sampler_lab::sampling::{Preset, Sampler, SamplerSpec};
-use sampler_lab::scene::compile::{Scene, Stage};
-use sampler_lab::scene::config::{CameraConfig, Estimator, SceneConfig};
-use sampler_lab::scene::geometry::face_normal;
-use sampler_lab::scene::mesh::{Material, Mesh};
-use sampler_lab::stats::{Family, Verdict, t_test};
 
+use crate::analytic::{DiffusePlane, Penumbra, Pinhole, PolygonLight};
+use crate::film::Image;
+use crate::render::render;
+use crate::sampling::{Preset, Sampler, SamplerSpec};
+use crate::scene::compile::{Scene, Stage};
+use crate::scene::config::{CameraConfig, Estimator, SceneConfig};
+use crate::scene::geometry::face_normal;
+use crate::scene::mesh::{Material, Mesh};
+use crate::stats::{Family, Verdict, t_test};
+
+/// The sampler of a text such as `sobol` or `halton:plain`.
+///
+/// # Panics
+/// Where there is none.
 pub fn spec(text: &str) -> SamplerSpec {
-    SamplerSpec::parse(text, Preset::Best).unwrap()
+    SamplerSpec::parse(text, Preset::Best).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// A mesh under construction.
-#[derive(Clone, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Room {
+    /// Triangles and materials so far.
     pub mesh: Mesh,
 }
 
@@ -37,6 +44,7 @@ impl Room {
         (self.mesh.materials.len() - 1) as u32
     }
 
+    /// One triangle, counter-clockwise from its front.
     pub fn triangle(&mut self, corners: [Vec3; 3], material: u32) {
         self.mesh.positions.push(corners);
         self.mesh.normals.push([face_normal(&corners); 3]);
@@ -64,16 +72,21 @@ impl Room {
         self.polygon(corners, material);
     }
 
+    /// The scene for an image of `size` (columns, rows), lights weighted without bias.
+    ///
+    /// # Panics
+    /// Where coordinates are too large for single precision.
     pub fn scene(&self, camera: &CameraConfig, size: (u32, u32), stage: Stage) -> Scene {
         self.scene_with(camera, size, stage, Estimator::Unbiased)
     }
 
+    /// As [`Self::scene`], with the estimator named.
+    ///
+    /// # Panics
+    /// As [`Self::scene`].
     pub fn scene_with(&self, camera: &CameraConfig, size: (u32, u32), stage: Stage, estimator: Estimator) -> Scene {
-        let mut config = SceneConfig::parse(b"{}", "memory", &[]).unwrap();
-        config.camera = *camera;
-        config.auto_focus = false;
-        config.estimator = estimator;
-        Scene::new(&config, self.mesh.clone(), size, stage).unwrap()
+        let config = SceneConfig { camera: *camera, auto_focus: false, estimator, ..SceneConfig::default() };
+        Scene::new(&config, self.mesh.clone(), size, stage).unwrap_or_else(|error| panic!("{error}"))
     }
 
     /// The same room with all lengths multiplied.
@@ -101,14 +114,38 @@ pub fn looking_at(pos: Vec3, target: Vec3, fov_degrees: f32) -> CameraConfig {
     CameraConfig { pos, dir, up, fov_degrees, lens_radius: 0.0, focal_depth: 1.0 }
 }
 
+/// The camera of a room whose lengths are all multiplied.
+pub fn scaled_camera(camera: &CameraConfig, scale: f32) -> CameraConfig {
+    CameraConfig {
+        pos: camera.pos * scale,
+        lens_radius: camera.lens_radius * scale,
+        focal_depth: camera.focal_depth * scale,
+        ..*camera
+    }
+}
+
+/// The image of `spp` samples a pixel.
+///
+/// # Panics
+/// Where a sample is not finite, or the sampler does not draw such a scene.
 pub fn rendered(scene: &Scene, sampler: SamplerSpec, spp: u32, seed: u64) -> Image {
-    let sampler = Sampler::new(sampler, &scene.layout, spp, seed).unwrap();
+    let sampler = Sampler::new(sampler, &scene.layout, spp, seed).unwrap_or_else(|error| panic!("{error}"));
     render(scene, &sampler).unwrap_or_else(|bad| panic!("{bad}")).image
 }
 
-/// Whole images under independent seeds: the red channel (all test scenes are grey).
-pub fn replicates(scene: &Scene, sampler: SamplerSpec, spp: u32, seeds: std::ops::Range<u64>) -> Vec<Vec<f64>> {
-    seeds.map(|seed| rendered(scene, sampler, spp, seed).pixels.iter().map(|p| f64::from(p[0])).collect()).collect()
+/// The image's grey, pixel by pixel.
+pub fn grey(image: &Image) -> Vec<f64> {
+    image.pixels.iter().map(|p| f64::from(p[0])).collect()
+}
+
+/// Whole images under independent seeds: their grey.
+pub fn replicates(
+    scene: &Scene,
+    sampler: SamplerSpec,
+    spp: u32,
+    seeds: impl IntoIterator<Item = u64>,
+) -> Vec<Vec<f64>> {
+    seeds.into_iter().map(|seed| grey(&rendered(scene, sampler, spp, seed))).collect()
 }
 
 /// The closed form's view of a polygon light.
@@ -119,7 +156,9 @@ pub fn polygon_light(corners: &[Vec3], emission: f32) -> PolygonLight {
 /// A value from a closed form, and how far off it the renderer may be by moving the ends of shadow rays.
 #[derive(Clone, Copy, Debug)]
 pub struct Exact {
+    /// The closed form's value.
     pub value: f64,
+    /// How far off it the expectation may be.
     pub allowance: f64,
 }
 
@@ -132,6 +171,7 @@ impl Exact {
         })
     }
 
+    /// A multiple.
     pub fn times(self, factor: f64) -> Self {
         Self { value: self.value * factor, allowance: self.allowance * factor }
     }
@@ -148,19 +188,26 @@ impl Exact {
 /// starts 2⁻¹⁸ of the floor's largest coordinate above it and ends as far below the light: seen from the moved point, blocker and
 /// light are that much lower. A quarter of the change is added for the rounding of positions (2⁻²² of the coordinates), and 64
 /// roundings of single precision.
+///
+/// # Panics
+/// Where the closed form has no value for the scene.
 pub fn with_allowance(scene: &Penumbra, floor_half: f64) -> Vec<Exact> {
     let light = scene.light();
     let largest = light.corners.iter().fold(0.0, |m: f64, c| m.max(c.abs().max_element()));
     let (start, end) = (floor_half / 262_144.0, largest / 262_144.0);
     let lower = |corners: &[DVec3], by: f64| corners.iter().map(|&c| c - DVec3::Y * by).collect::<Vec<_>>();
     let moved = PolygonLight { corners: lower(&light.corners, start + end), ..light.clone() };
-    let moved = Penumbra::new(*scene.camera(), *scene.plane(), moved, lower(scene.blocker(), start)).unwrap();
-    let both = scene.image().unwrap().into_iter().zip(moved.image().unwrap());
+    let moved = Penumbra::new(*scene.camera(), *scene.plane(), moved, lower(scene.blocker(), start));
+    let image = |scene: &Penumbra| scene.image().unwrap_or_else(|error| panic!("{error}"));
+    let both = image(scene).into_iter().zip(image(&moved.unwrap_or_else(|error| panic!("{error}"))));
     both.map(|(value, moved)| Exact { value, allowance: 1.25 * (moved - value).abs() + value / 262_144.0 }).collect()
 }
 
 /// Exact pixels of a floor y = 0 under one light, behind a blocker where there is one, by quadrature of the closed form
 /// over each pixel's square.
+///
+/// # Panics
+/// As [`with_allowance`].
 pub fn floor_pixels(
     camera: &CameraConfig,
     (width, height): (u32, u32),
@@ -181,5 +228,5 @@ pub fn floor_pixels(
     };
     let plane = DiffusePlane { point: DVec3::ZERO, normal: DVec3::Y, albedo };
     let blocker = blocker.map_or(beyond, |b| b.iter().map(|c| c.as_dvec3()).collect());
-    with_allowance(&Penumbra::new(pinhole, plane, light, blocker).unwrap(), floor_half)
+    with_allowance(&Penumbra::new(pinhole, plane, light, blocker).unwrap_or_else(|error| panic!("{error}")), floor_half)
 }
