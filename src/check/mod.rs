@@ -7,14 +7,20 @@
 //! Adding one: a function `fn(&Context) -> Finding` in the module of its group, usually by way of a [`Tally`], and a
 //! line in that module's `checks()`.
 
+pub mod catalogue;
+mod select;
 mod tally;
 
 pub mod estimators;
 pub mod failures;
 pub mod harness;
 pub mod metrics;
+#[cfg(feature = "mutants")]
+pub mod planted;
+pub mod quick;
 pub mod room;
 pub mod samplers;
+pub mod scene;
 pub mod statistics;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -24,6 +30,7 @@ use serde::Serialize;
 use crate::sampling::hash::{derive, derive_named};
 use crate::stats::hypothesis::{Family, sidak};
 
+pub use select::{FAILURES, select};
 pub use tally::{Finding, Tally};
 
 /// The false-alarm rate of a whole run of all checks, unless told otherwise.
@@ -133,6 +140,54 @@ pub struct Result {
     pub finding: Finding,
 }
 
+impl Result {
+    /// One line: verdict, group, name, p-value against its level, rate and power.
+    pub fn line(&self) -> String {
+        let Finding { passed, p_value, threshold, false_alarm, detects, tests, .. } = &self.finding;
+        let verdict = if *passed { "pass" } else { "FAIL" };
+        let mut parts = Vec::new();
+        match (p_value, threshold) {
+            (Some(p), Some(threshold)) => parts.push(format!("p = {} of {threshold:.0e}", short(*p))),
+            (None, _) if *false_alarm == 0.0 => parts.push("exact".to_owned()),
+            _ => {}
+        }
+        if *false_alarm > 0.0 {
+            parts.push(format!("false alarms {false_alarm:.0e}"));
+        }
+        match detects {
+            Some(detects) if *false_alarm > 0.0 => parts.push(format!("catches {}", percent(*detects))),
+            Some(tolerance) if *tolerance > 0.0 => parts.push(format!("to {tolerance:.0e}")),
+            _ => {}
+        }
+        parts.push(if *tests == 1 { "1 test".to_owned() } else { format!("{tests} tests") });
+        format!("{verdict}  {:<20} {:<32} {}", self.group, self.name, parts.join(", "))
+    }
+}
+
+/// A probability in two digits.
+fn short(p: f64) -> String {
+    if p >= 0.001 { format!("{p:.2}") } else { format!("{p:.0e}") }
+}
+
+/// A share in two digits.
+fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    if percent >= 10.0 {
+        format!("{percent:.0} %")
+    } else if percent >= 0.01 {
+        format!("{percent:.2} %")
+    } else {
+        format!("{percent:.0e} %")
+    }
+}
+
+/// The false-alarm rate of independent results together, 1 − Π(1 − α).
+pub fn false_alarm(results: &[Result]) -> f64 {
+    let log: f64 = results.iter().map(|r| libm::log1p(-r.finding.false_alarm)).sum();
+    // Of nothing it is 0, not −0.
+    -libm::expm1(log) + 0.0
+}
+
 /// Every check, group by group.
 pub fn all() -> Vec<Check> {
     [
@@ -141,6 +196,7 @@ pub fn all() -> Vec<Check> {
         statistics::checks(),
         estimators::checks(),
         harness::checks(),
+        quick::checks(),
         failures::checks(),
     ]
     .concat()

@@ -1,5 +1,6 @@
 //! Arguments, and what goes where: results to stdout or files, all else to stderr.
 
+mod check;
 mod compare;
 mod experiment;
 mod folders;
@@ -47,6 +48,8 @@ enum Command {
     Measure(sets::Measure),
     /// Compare images of any renderer with a reference: errors, intervals, gates
     Compare(compare::Compare),
+    /// Test the lab itself, or a sampler on a scene: verdicts with false-alarm rate and power
+    Check(check::Check),
     /// Show or check a scene file
     Config(Config),
     /// Say what a sampler does, and which numbers its decisions read for a scene
@@ -66,6 +69,7 @@ impl Cli {
             Command::Points(args) => args.run(),
             Command::Measure(args) => args.run(),
             Command::Compare(args) => args.run(),
+            Command::Check(args) => args.run(),
             Command::Config(args) => args.run(),
             Command::Explain(args) => args.run(),
         }

@@ -15,7 +15,7 @@ mod about;
 pub mod backend;
 mod compared;
 mod entry;
-mod exact;
+pub mod exact;
 pub mod execute;
 pub mod folder;
 pub mod growth;

@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use crate::accel::Ray;
+use crate::mutants::{Mutant, planted};
 use crate::scene::config::Estimator;
 use crate::scene::geometry::SurfacePoint;
 use crate::scene::light::{Light, LightSet, pick_light};
@@ -29,11 +30,22 @@ pub fn light_contribution(light: &Light, u: Vec2, from: &SurfacePoint) -> Option
     let way = to.position - origin;
     let r = way.length();
     let omega = way / r;
-    let (cos_surface, cos_light) = (omega.dot(from.normal), -omega.dot(to.normal));
+    let (mut cos_surface, mut cos_light) = (omega.dot(from.normal), -omega.dot(to.normal));
+    if planted(Mutant::LitFromBehind) {
+        cos_surface = cos_surface.abs();
+    }
+    if planted(Mutant::LightFromBehind) {
+        cos_light = cos_light.abs();
+    }
     if !(cos_surface > 0.0 && cos_light > 0.0) {
         return None;
     }
-    let weight = cos_surface * cos_light * (light.area / r / r);
+    let weight = match () {
+        () if planted(Mutant::CosineSquared) => cos_surface * cos_surface * cos_light * (light.area / r / r),
+        () if planted(Mutant::LightCosineForgotten) => cos_surface * (light.area / r / r),
+        () if planted(Mutant::DistanceNotSquared) => cos_surface * cos_light * (light.area / r),
+        () => cos_surface * cos_light * (light.area / r / r),
+    };
     Some((light.emission * weight, Ray { origin, direction: way }))
 }
 
@@ -53,6 +65,7 @@ pub(super) fn direct_light(
         LightSet::Many { lights, pmf, cumulative, .. } => {
             let index = pick_light(cumulative, pick);
             match estimator {
+                Estimator::Unbiased if planted(Mutant::ProbabilityMissing) => (&lights[index], 1.0),
                 Estimator::Unbiased => (&lights[index], pmf[index]),
                 // The sheet's shortcut: as if the light had been certain. Offered to show its error.
                 Estimator::Sheet => (&lights[index], 1.0),

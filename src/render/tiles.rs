@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::accel::{LANES, Packet, Ray};
 use crate::film::Image;
+use crate::mutants::{Mutant, planted};
 use crate::sampling::{PixelKey, PointSource};
 use crate::scene::camera::{Aperture, PixelSample};
 use crate::scene::compile::Scene;
@@ -214,7 +215,8 @@ fn render_pixels<S: PointSource>(
             }
         }
     }
-    let mean = |sum: &[f64; 3]| sum.map(|s| (s / f64::from(samples)) as f32);
+    let count = if planted(Mutant::MeanOverOneMore) { samples + 1 } else { samples };
+    let mean = |sum: &[f64; 3]| sum.map(|s| (s / f64::from(count)) as f32);
     Ok(TileResult { pixels: pixels.iter().copied().zip(sums.iter().map(mean)).collect(), rays: lanes.ray_count })
 }
 
@@ -284,8 +286,10 @@ impl Lanes {
             let u = Vec2::new(self.light[0][lane], self.light[1][lane]);
             let albedo = albedo(scene, &point);
             if let Some(c) = direct_light(lights, scene.estimator, self.pick[lane], u, &point, albedo) {
-                self.radiance[lane] = c.radiance;
-                self.shadow.set(lane, &c.shadow_ray, 1.0);
+                self.radiance[lane] =
+                    if planted(Mutant::SampleClamped) { c.radiance.min(Vec3::ONE) } else { c.radiance };
+                let end = if planted(Mutant::ShadowRayTooLong) { 1.01 } else { 1.0 };
+                self.shadow.set(lane, &c.shadow_ray, end);
                 shadows += 1;
             }
         }

@@ -1,6 +1,7 @@
 //! Radical inverses: van der Corput, Halton, Hammersley, and Halton with nested random digit permutations.
 
 use super::hash::bits64;
+use crate::mutants::{Mutant, planted, wrong};
 
 /// The primes that Halton's first axes take as bases.
 pub const PRIMES: [u32; 16] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53];
@@ -24,6 +25,9 @@ pub fn mirrored(base: u32, mut index: u32) -> (u64, u64) {
 /// Halton (1960), doi:10.1007/BF01386213. For `index` < 2²⁴ and bases up to 53 the value is below 2³², never 1.
 #[inline]
 pub fn radical_inverse(base: u32, index: u32) -> u32 {
+    if planted(Mutant::RadicalInverseInSingle) {
+        return wrong::radical_inverse(base, index);
+    }
     if base == 2 {
         return index.reverse_bits();
     }
@@ -79,7 +83,7 @@ fn scrambled(base: u32, digits: u32, index: u32, key: u64) -> u32 {
         let factor = 1 + (((draw >> 32) * (b - 1)) >> 32) as u32;
         let offset = (((draw & 0xffff_ffff) * b) >> 32) as u32;
         mirror = mirror * b + u64::from((factor * digit + offset) % base);
-        prefix += u64::from(digit) * power;
+        prefix += if planted(Mutant::DigitsNotNested) { 0 } else { u64::from(digit) * power };
         power *= b;
     }
     let tail = bits64(key, prefix | (u64::from(digits) << 40)) >> 32;

@@ -8,6 +8,7 @@ use super::sobol::{SobolAxis, owen_scramble};
 use super::spec::{MAX_SAMPLES, Order, Points, Random, SamplerSpec, Scope};
 use super::strata::{factor_pair, in_stratum, in_stratum_f64};
 use crate::error::{Error, Result};
+use crate::mutants::{Mutant, planted, wrong};
 
 /// Raised whenever the numbers of any sampler change.
 pub const ALGORITHM: u32 = 1;
@@ -20,6 +21,11 @@ impl PixelKey {
     /// The pixel in column `x` from the left and row `y` from the top.
     pub const fn new(x: u32, y: u32) -> Self {
         Self((y as u64) << 32 | x as u64)
+    }
+
+    /// The key as a word, different for every pixel: for keys that are derived from it.
+    pub const fn word(self) -> u64 {
+        self.0
     }
 }
 
@@ -262,24 +268,30 @@ impl DecisionSampler {
     }
 
     fn reseed(&mut self, seed: u64) {
+        let seed = if planted(Mutant::SeedsReused) { seed >> 1 } else { seed };
         let decision = self.decision as u64;
         let random_path: &[u64] = match self.spec.scope {
+            _ if planted(Mutant::DecisionsShareSeed) => &[RANDOM_TAG],
             Scope::Decision | Scope::Each => &[RANDOM_TAG, decision],
             Scope::Image | Scope::Pixel => &[RANDOM_TAG],
         };
         self.random_key = derive(seed, random_path);
-        self.shuffle_key = derive(seed, &[SHUFFLE_TAG, decision]);
+        self.shuffle_key = derive(seed, &[SHUFFLE_TAG, if planted(Mutant::ShuffleShared) { 0 } else { decision }]);
     }
 
     #[inline]
     fn keys(&self, pixel: PixelKey) -> Keys {
         let of_pixel = match self.spec.scope {
+            _ if planted(Mutant::PixelKeyDropped) => 0,
             Scope::Pixel | Scope::Each => mix64(pixel.0.wrapping_add(0x51_7cc1_b727_220a)),
             Scope::Image | Scope::Decision => 0,
         };
         let key = |base: u64, word: u64| mix64(base ^ of_pixel.wrapping_add(word.wrapping_mul(0xd6e8_feb8_6659_fd93)));
         Keys {
-            axes: [0, 1].map(|a: usize| key(self.random_key, u64::from(self.axes[a].dimension) + 1)),
+            axes: [0, 1].map(|a: usize| {
+                let a = if planted(Mutant::AxesShareKey) { 0 } else { a };
+                key(self.random_key, u64::from(self.axes[a].dimension) + 1)
+            }),
             shuffle: key(self.shuffle_key, 0),
         }
     }
@@ -292,7 +304,9 @@ impl DecisionSampler {
         assert!(end <= u64::from(self.samples), "samples {first} to {end} asked of {}", self.samples);
         let mut places = [0; BLOCK];
         let indices = (first..).zip(&mut places[..count]);
-        if self.spec.order == Order::Shuffle {
+        if self.spec.order == Order::Shuffle && planted(Mutant::ShuffleWithReplacement) {
+            indices.for_each(|(index, place)| *place = bits32(keys.shuffle, index) % self.samples);
+        } else if self.spec.order == Order::Shuffle && !planted(Mutant::ShuffleForgotten) {
             let permutation = Permutation::new(self.samples, keys.shuffle);
             indices.for_each(|(index, place)| *place = permutation.place(index));
         } else {
@@ -308,10 +322,13 @@ impl DecisionSampler {
     fn fractions(&self, axis: usize, places: &[u32], keys: &Keys, put: impl FnMut(usize, u32)) {
         let key = keys.axes[axis];
         let (columns, rows) = self.strata;
+        let row_length = if planted(Mutant::StrataTransposed) { rows } else { columns };
+        let skipped = if planted(Mutant::FirstPointDropped) { 1 } else { 0 };
+        let jitter = |i| if planted(Mutant::JitterForgotten) { 0 } else { bits32(key, i) };
         match &self.axes[axis].kind {
             AxisKind::Uniform => each(places, put, |i| bits32(key, i)),
-            AxisKind::StratifiedX => each(places, put, |i| in_stratum(i % columns, columns, bits32(key, i))),
-            AxisKind::StratifiedY => each(places, put, |i| in_stratum(i / columns, rows, bits32(key, i))),
+            AxisKind::StratifiedX => each(places, put, |i| in_stratum(i % row_length, columns, jitter(i))),
+            AxisKind::StratifiedY => each(places, put, |i| in_stratum(i / row_length, rows, jitter(i))),
             AxisKind::Halton { base, digits } if self.spec.random == Random::Digits => {
                 each(places, put, |i| digit_scrambled(*base, *digits, i, key));
             }
@@ -319,9 +336,15 @@ impl DecisionSampler {
             AxisKind::HammersleyX if self.spec.random == Random::Yxor => {
                 each(places, put, |i| in_stratum(i, self.samples, 0));
             }
-            AxisKind::HammersleyX => self.randomised(key, places, put, |i| in_stratum(i, self.samples, 0)),
-            AxisKind::VanDerCorput => self.randomised(key, places, put, u32::reverse_bits),
-            AxisKind::Sobol(sobol) => self.randomised(key, places, put, |i| sobol.fraction(i)),
+            AxisKind::HammersleyX => {
+                let cells = if planted(Mutant::DividedByOneLess) { self.samples - 1 } else { self.samples };
+                self.randomised(key, places, put, |i| in_stratum(i, cells, 0));
+            }
+            AxisKind::VanDerCorput if planted(Mutant::BytesReversed) => {
+                self.randomised(key, places, put, u32::swap_bytes);
+            }
+            AxisKind::VanDerCorput => self.randomised(key, places, put, |i| (i + skipped).reverse_bits()),
+            AxisKind::Sobol(sobol) => self.randomised(key, places, put, |i| sobol.fraction(i + skipped)),
         }
     }
 
@@ -332,7 +355,12 @@ impl DecisionSampler {
         let word = key as u32;
         match self.spec.random {
             Random::Xor | Random::Yxor => each(places, put, |i| plain(i) ^ word),
+            Random::Shift if planted(Mutant::ShiftClamped) => each(places, put, |i| plain(i).saturating_add(word)),
             Random::Shift => each(places, put, |i| plain(i).wrapping_add(word)),
+            Random::Owen if planted(Mutant::XorForOwen) => each(places, put, |i| plain(i) ^ word),
+            Random::Owen if planted(Mutant::OwenOfBurley) => {
+                each(places, put, |i| wrong::burley_scramble(plain(i), word));
+            }
             Random::Owen => each(places, put, |i| owen_scramble(plain(i), word)),
             Random::None | Random::Fresh | Random::Jitter | Random::Digits => each(places, put, plain),
         }

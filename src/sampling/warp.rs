@@ -27,7 +27,7 @@ pub fn square_to_disk(u: Vec2) -> Vec2 {
 /// Weights (b₀, b₁, b₂) of a uniform point of a triangle: b₀ = 1 − √u, b₁ = √u (1 − v), b₂ = √u v; pdf 1/area.
 #[inline]
 pub fn square_to_triangle(u: Vec2) -> Vec3 {
-    let root = u.x.sqrt();
+    let root = if planted(Mutant::TriangleWithoutRoot) { u.x } else { u.x.sqrt() };
     Vec3::new(1.0 - root, root * (1.0 - u.y), root * u.y)
 }
 

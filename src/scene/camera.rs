@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use crate::accel::{Accel, Ray};
+use crate::mutants::{Mutant, planted};
 use crate::sampling::{Dim2, warp};
 
 use super::config::CameraConfig;
@@ -80,6 +81,7 @@ impl Camera {
     /// Direction with unit part along the viewing direction, to the image point `at`: (0, 0) top left, `size` bottom right.
     #[inline]
     fn through(&self, at: Vec2) -> Vec3 {
+        let at = if planted(Mutant::PixelOffByHalf) { at + 0.5 } else { at };
         let x = (2.0 * at.x / self.size.0 as f32 - 1.0) * self.half.x;
         let y = (1.0 - 2.0 * at.y / self.size.1 as f32) * self.half.y;
         self.dir + self.right * x + self.up * y
@@ -97,9 +99,11 @@ impl Camera {
     /// focus is a plane. Written as d − o/f it stays finite for any focal depth.
     #[inline]
     pub fn lens_ray(&self, at: Vec2, u: Vec2, radius: f32, focal_depth: f32) -> Ray {
+        let radius = if planted(Mutant::LensOfDiameter) { 2.0 * radius } else { radius };
         let disk = warp::square_to_disk(u) * radius;
         let offset = self.right * disk.x + self.up * disk.y;
-        Ray { origin: self.pos + offset, direction: (self.through(at) - offset / focal_depth).normalize() }
+        let through = if planted(Mutant::FocusOnSphere) { self.through(at).normalize() } else { self.through(at) };
+        Ray { origin: self.pos + offset, direction: (through - offset / focal_depth).normalize() }
     }
 
     /// Geometric mean of the depths, along `dir`, that 64 × 64 rays through the central quarter of width and height meet.

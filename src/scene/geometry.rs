@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use crate::accel::{Ray, Triangle};
+use crate::mutants::{Mutant, planted};
 
 use super::mesh::Mesh;
 
@@ -45,6 +46,9 @@ pub fn area(corners: &[Vec3; 3]) -> f64 {
 /// same picture comes out at any scale.
 #[inline]
 pub fn offset_length(corners: &[Vec3; 3]) -> f32 {
+    if planted(Mutant::EpsilonAbsolute) {
+        return 1e-3;
+    }
     let largest = corners[0].abs().max(corners[1].abs()).max(corners[2].abs()).max_element();
     largest * (1.0 / 262_144.0)
 }

@@ -2,6 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
+use crate::mutants::{Mutant, planted};
 use crate::sampling::{Decision, Dim1, Dim2, SampleLayout, warp};
 
 use super::geometry::{area, face_normal, offset_length};
@@ -83,7 +84,8 @@ impl Light {
             Shape::Mesh { triangles: parts.collect() }
         });
         let power = total * f64::from(luma(emission));
-        Some(Self { name, emission, area: total as f32, power, shape })
+        let counted = if planted(Mutant::LightAreaHalved) { 0.5 * total } else { total };
+        Some(Self { name, emission, area: counted as f32, power, shape })
     }
 
     /// Whether two triangles were recognised as one parallelogram.
@@ -228,6 +230,9 @@ fn pick_steps(powers: &[f64]) -> Vec<u32> {
 /// Index of the light that `u` in [0, 1) picks from cumulative probabilities that end in 1.
 #[inline]
 pub fn pick_light(cumulative: &[f64], u: f32) -> usize {
+    if planted(Mutant::LightsPickedEvenly) {
+        return (u * cumulative.len() as f32) as usize;
+    }
     cumulative.partition_point(|&c| c <= f64::from(u))
 }
 

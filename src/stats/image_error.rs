@@ -10,6 +10,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::mutants::{Mutant, planted};
+
 use super::moments::{Estimate, Moments, jackknife, jackknife_variance, sum, two_sided_factor};
 
 /// ε of the relative mean square error: keeps black pixels finite, in squared radiance.
@@ -38,7 +40,7 @@ pub fn mse_unbiased<P: Copy + Into<f64>>(t: &[P], r1: &[P], r2: &[P]) -> f64 {
     assert!(t.len() == r1.len() && t.len() == r2.len(), "image and references differ in size");
     let products = t.iter().zip(r1).zip(r2).map(|((&t, &r1), &r2)| {
         let (t, r1, r2): (f64, f64, f64) = (t.into(), r1.into(), r2.into());
-        (t - r1) * (t - r2)
+        (t - r1) * (t - if planted(Mutant::ReferenceNoiseKept) { r1 } else { r2 })
     });
     sum(products) / t.len() as f64
 }

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::mutants::{Mutant, planted};
+
 use super::special::{incomplete_gamma_upper, solve_falling, student_two_sided_inverse};
 
 /// A number with its 95 % confidence interval.
@@ -85,7 +87,8 @@ impl Moments {
 
     /// Unbiased variance Σ(x − mean)²/(n − 1); `None` below two values.
     pub fn variance(&self) -> Option<f64> {
-        (self.n > 1).then(|| self.squares / (self.n - 1) as f64)
+        let freedom = if planted(Mutant::VarianceByN) { self.n } else { self.n.saturating_sub(1) };
+        (self.n > 1).then(|| self.squares / freedom as f64)
     }
 
     /// Standard deviation, the root of [`variance`](Self::variance); `None` below two values.

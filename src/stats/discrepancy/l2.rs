@@ -8,6 +8,8 @@ use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
+use crate::mutants::{Mutant, planted};
+
 use super::Points;
 use super::double::Double;
 use super::ordered::{Kernel, Order};
@@ -301,6 +303,7 @@ fn mean_over_pairs(points: &Points, k: impl Fn((f64, f64), (f64, f64)) -> f64 + 
     let row = |i: usize| {
         let own = |[xs, halves]: &[Vec<f64>; 2]| (xs[i], halves[i]);
         let diagonal = axes.iter().map(|axis| k(own(axis), own(axis))).product::<f64>();
+        let diagonal = if planted(Mutant::L2WithoutDiagonal) { 0.0 } else { diagonal };
         row_sum(&axes, i, &k).scaled(2.0).plus(Double::from(diagonal))
     };
     let rows: Vec<Double> = (0..n).into_par_iter().with_min_len(16).map(row).collect();

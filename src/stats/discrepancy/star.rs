@@ -9,6 +9,8 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::mutants::{Mutant, planted};
+
 use super::Points;
 use super::boxes::star_bounded;
 use super::plane::sweep;
@@ -129,7 +131,9 @@ impl Largest {
 /// Distinct coordinates in rising order, and 1: the critical grid on one axis.
 pub(super) fn grid(axis: &[f64]) -> Vec<f64> {
     let mut grid = axis.to_vec();
-    grid.push(1.0);
+    if !planted(Mutant::StarWithoutOne) {
+        grid.push(1.0);
+    }
     // Not negative, so the bits are ordered as the numbers are.
     grid.sort_unstable_by_key(|x| x.to_bits());
     grid.dedup();

@@ -2,6 +2,7 @@
 
 use super::means::chi2_upper_tail;
 use super::{Family, POWER, Verdict};
+use crate::mutants::{Mutant, planted};
 use crate::stats::moments::sum;
 use crate::stats::special::solve_falling;
 
@@ -54,7 +55,8 @@ pub fn chi2_test_of(observed: &[u64], expected: &[f64], tail: Tail, family: Fami
         return undefined("fewer than two cells are left after pooling");
     }
     let statistic = sum(cells.iter().map(|&(o, e)| (o as f64 - e) * (o as f64 - e) / e));
-    let freedom = cells.len() as f64 - 1.0;
+    let constraints = if planted(Mutant::CellsAsFreedom) { 0.0 } else { 1.0 };
+    let freedom = cells.len() as f64 - constraints;
     let upper = chi2_upper_tail(statistic, freedom);
     // The lower tail loses digits by this difference only where it is near 1, far from any threshold but for very even
     // counts, where the upper one is 1 and the lower needs its own series.
@@ -233,7 +235,8 @@ pub fn ks_uniform_test(values: &[f64], family: Family) -> Verdict {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let n = sorted.len() as f64;
-    let gap = |(i, &v): (usize, &f64)| ((i + 1) as f64 / n - v).max(v - i as f64 / n);
+    let below = |i: usize, v: f64| if planted(Mutant::SmirnovOneSided) { 0.0 } else { v - i as f64 / n };
+    let gap = |(i, &v): (usize, &f64)| ((i + 1) as f64 / n - v).max(below(i, v));
     let distance = sorted.iter().enumerate().map(gap).fold(0.0, f64::max);
     let bound = |chance: f64| (-libm::log(chance) / (2.0 * n)).sqrt();
     Verdict {

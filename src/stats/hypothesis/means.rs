@@ -1,6 +1,7 @@
 //! Means of replicates: against an exact value, and against each other.
 
 use super::{Family, Outcome, POWER, Verdict};
+use crate::mutants::{Mutant, planted};
 use crate::stats::moments::{Moments, student_t_quantile, two_sided_factor};
 use crate::stats::special::{incomplete_gamma_upper, normal_upper_tail, student_two_sided, student_two_sided_inverse};
 
@@ -55,6 +56,7 @@ pub fn z_test(value: f64, exact: f64, standard_error: f64, family: Family) -> Ve
 fn against_exact(value: f64, exact: f64, error: f64, df: f64, family: Family) -> Verdict {
     // Shifted by the bias, T is outside ± the critical value with probability POWER once the bias exceeds both
     // quantiles; for Student this treats the estimated error as fixed, which is good to its relative spread.
+    let df = if planted(Mutant::NormalForStudent) { f64::INFINITY } else { df };
     let critical = student_two_sided_inverse(family.per_test(), df);
     let detects = Some((critical + student_t_quantile(POWER, df)) * error);
     let answer = match definite(value, exact, error) {
@@ -97,7 +99,11 @@ pub fn welch(a: &[f64], b: &[f64]) -> Option<WelchResult> {
     let t = (mean_a - mean_b) / error;
     // As shares of the total: their fourth powers cannot all underflow.
     let share = |e: f64, n: u64| (e / error) * (e / error) * (e / error) * (e / error) / (n - 1) as f64;
-    let df = 1.0 / (share(error_a, a.n()) + share(error_b, b.n()));
+    let df = if planted(Mutant::PooledFreedom) {
+        (a.n() + b.n() - 2) as f64
+    } else {
+        1.0 / (share(error_a, a.n()) + share(error_b, b.n()))
+    };
     Some(WelchResult { t: Some(t), df: Some(df), p_two_sided: student_two_sided(t, df) })
 }
 

@@ -29,6 +29,8 @@ mod tests;
 
 use std::fmt;
 
+use crate::mutants::{Mutant, planted};
+
 pub use distributions::{
     MIN_EXPECTED, Tail, cell_masses, chi2_masses_test, chi2_test, chi2_test_of, ks_test, ks_uniform_test,
 };
@@ -76,6 +78,9 @@ impl Family {
 ///
 /// It keeps the family's rate for independent tests, and for the usual positively dependent ones.
 pub fn sidak(alpha: f64, tests: u64) -> f64 {
+    if planted(Mutant::SidakInSingle) {
+        return 1.0 - f64::from(libm::powf(1.0 - alpha as f32, 1.0 / tests as f32));
+    }
     -libm::expm1(libm::log1p(-alpha) / tests as f64)
 }
 

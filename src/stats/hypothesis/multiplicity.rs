@@ -1,6 +1,7 @@
 //! Many tests at once: p-values adjusted for their number.
 
 use crate::error::{Error, Result};
+use crate::mutants::{Mutant, planted};
 
 /// p-values are probabilities: anything else is an error that names its place in the list.
 fn ranked(p_values: &[f64]) -> Result<Vec<usize>> {
@@ -24,7 +25,8 @@ pub fn holm(p_values: &[f64]) -> Result<Vec<f64>> {
     let mut adjusted = vec![0.0; p_values.len()];
     let mut largest: f64 = 0.0;
     for (rank, i) in ranked(p_values)?.into_iter().enumerate() {
-        largest = largest.max(((p_values.len() - rank) as f64 * p_values[i]).min(1.0));
+        let left = if planted(Mutant::HolmFromTheWrongEnd) { rank + 1 } else { p_values.len() - rank };
+        largest = largest.max((left as f64 * p_values[i]).min(1.0));
         adjusted[i] = largest;
     }
     Ok(adjusted)

@@ -7,6 +7,7 @@ use statrs::distribution::{Binomial, DiscreteCDF, Hypergeometric};
 
 use super::means::same_but_for_rounding;
 use super::{Family, Outcome, POWER, Verdict};
+use crate::mutants::{Mutant, planted};
 use crate::stats::moments::student_t_quantile;
 use crate::stats::special::{incomplete_beta, solve_falling, student_two_sided_inverse};
 
@@ -135,6 +136,10 @@ pub fn clopper_pearson(successes: u64, trials: u64, confidence: f64) -> [f64; 2]
     assert!(successes <= trials, "{successes} successes in {trials} trials");
     let tail = 0.5 * (1.0 - confidence);
     let (k, n) = (successes as f64, trials as f64);
+    if planted(Mutant::WaldInterval) {
+        let half = super::normal_factor(confidence) * (k / n * (1.0 - k / n) / n).sqrt();
+        return [k / n - half, k / n + half];
+    }
     let at_least_k = |p: f64| incomplete_beta(k, n - k + 1.0, p, 1.0 - p);
     let at_most_k = |p: f64| incomplete_beta(n - k, k + 1.0, 1.0 - p, p);
     let low = if successes == 0 { 0.0 } else { solve_falling(|p| -at_least_k(p), -tail, 0.0, 1.0) };
