@@ -12,7 +12,7 @@ use crate::stats::hypothesis::{sidak, two_sided};
 use crate::stats::{Family, Moments, t_test};
 
 /// Two decisions, by their place among those that read numbers.
-type Pair = [usize; 2];
+type Places = [usize; 2];
 
 /// Most samples of a pixel that are looked at, the first ones.
 const MOST: u32 = 1 << 14;
@@ -50,7 +50,7 @@ pub fn pairs(set: SamplerSet, layout: &SampleLayout, spp: u32, seed: u64, replic
             (claim.decision, ticket)
         })
         .collect();
-    let mut together: Vec<(Pair, Vec<[[f64; 2]; 2]>)> = Vec::new();
+    let mut together: Vec<(Places, Vec<[[f64; 2]; 2]>)> = Vec::new();
     let mut owners: Vec<Decision> = Vec::new();
     let mut n = 1;
     for replicate in 0..replicates {
