@@ -52,6 +52,11 @@ fn scrambles() {
 }
 
 #[test]
+fn statistics() {
+    run_group("failures: statistics");
+}
+
+#[test]
 fn lights() {
     run_group("failures: lights");
 }

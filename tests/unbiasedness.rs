@@ -34,7 +34,7 @@ fn cases() -> impl Strategy<Value = Case> {
 
 #[test]
 fn random_scenes_have_the_radiance_of_their_closed_form() {
-    let family = Family { tests: CASES, false_alarm: 1e-7 };
+    let family = Family { tests: u64::from(CASES), false_alarm: 1e-7 };
     let caught: RefCell<Vec<f64>> = RefCell::default();
     let dark = RefCell::new(0);
     runner(29)
@@ -63,7 +63,7 @@ fn random_scenes_have_the_radiance_of_their_closed_form() {
 /// Samples are 0 or 1, so a pixel's mean over 16 of them, one a seed, has a spread of at most 1/8: 2048 seeds catch 3 % of the pixel.
 #[test]
 fn random_edges_cover_a_pixel_as_their_closed_form_says() {
-    let family = Family { tests: CASES, false_alarm: 1e-7 };
+    let family = Family { tests: u64::from(CASES), false_alarm: 1e-7 };
     let edges = (prop::array::uniform6(0.0f64..1.0), 0usize..6)
         .prop_filter_map("hardly any of the pixel", |(u, sampler)| EdgeCase::new(u, sampler));
     runner(31)

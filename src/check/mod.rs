@@ -83,7 +83,7 @@ pub struct Context {
 impl Context {
     /// A family of this check's tests, which together keep its false-alarm rate.
     pub fn family(&self, tests: u32) -> Family {
-        Family { tests, false_alarm: self.false_alarm }
+        Family { tests: u64::from(tests), false_alarm: self.false_alarm }
     }
 
     /// `usual` replicates in proportion to the effort, at least `least`.
@@ -119,7 +119,7 @@ impl Settings {
     /// whether it runs alone or among the others.
     pub fn context(&self, check: &Check) -> Context {
         let statistical = all().iter().filter(|c| c.kind == Kind::Statistical).count().max(1);
-        let false_alarm = sidak(self.alpha, u32::try_from(statistical).expect("a few hundred checks"));
+        let false_alarm = sidak(self.alpha, statistical as u64);
         Context { seed: derive_named(self.seed, check.name), false_alarm, effort: self.effort }
     }
 }

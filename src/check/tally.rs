@@ -80,7 +80,8 @@ impl Tally {
         };
         let said = || format!("{what}: {verdict}");
         let worst = Worst {
-            margin: p / verdict.threshold,
+            // How near the test came to failing, in either direction of proof.
+            margin: verdict.slack(),
             what: what.clone(),
             statistic: verdict.statistic,
             p_value: Some(p),

@@ -128,7 +128,7 @@ impl Measure {
     pub fn run(self) -> Result<()> {
         self.work.start_threads()?;
         let (points, sampler) = self.points()?;
-        if !(self.max_cost > 0.0) {
+        if self.max_cost.is_nan() || self.max_cost <= 0.0 {
             return Err(Error::input(
                 "--max-cost",
                 format!("expected a number of steps above 0, found {}", self.max_cost),

@@ -15,6 +15,7 @@ mod rendering;
 mod room;
 mod scrambles;
 mod sharing;
+mod statistics;
 
 use super::Check;
 
@@ -28,6 +29,7 @@ pub fn checks() -> Vec<Check> {
         net_counts::checks(),
         domains::checks(),
         scrambles::checks(),
+        statistics::checks(),
         rendering::checks(),
         metrics::checks(),
     ]

@@ -159,7 +159,7 @@ impl Question {
     /// Asks one of [`CHECKS`]. The false-alarm rate of all together is `settings.alpha`.
     pub fn run(&self, check: &SceneCheck, settings: &Settings) -> Result {
         let statistical = CHECKS.iter().filter(|c| c.kind == Kind::Statistical).count();
-        let level = sidak(settings.alpha, statistical as u32);
+        let level = sidak(settings.alpha, statistical as u64);
         let finding = (check.ask)(self, settings, level);
         let false_alarm = if check.kind == Kind::Statistical { level } else { 0.0 };
         let finding = Finding { false_alarm, ..finding };

@@ -71,7 +71,7 @@ pub fn pairs(set: SamplerSet, layout: &SampleLayout, spp: u32, seed: u64, replic
         }
     }
     // A mean and a spread of each function of each pair.
-    let each = sidak(level, (4 * together.len()).max(1) as u32);
+    let each = sidak(level, (4 * together.len()).max(1) as u64);
     let mut pairs: Vec<Pair> = Vec::new();
     for ([a, b], list) in together {
         let decisions = [owners[a], owners[b]];

@@ -149,7 +149,7 @@ pub fn compare(tiling: &Tiling, found: &Series, truth: &Truth<'_>, rules: Rules)
         alone.push(quiet);
     }
     alone.push(vec![whole]);
-    let rules = Rules { level: sidak(rules.level, alone.len() as u32), ..rules };
+    let rules = Rules { level: sidak(rules.level, alone.len() as u64), ..rules };
     let places: Vec<Compared> = alone
         .iter()
         .map(|members| {

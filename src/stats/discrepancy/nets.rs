@@ -120,19 +120,23 @@ fn is_even(axes: &[&[f64]], shape: &[u32], bits: u32, counts: &mut [u32]) -> boo
 
 /// Smallest distance between two points on the torus, where 0 and 1 are the same place; `None` for a single point.
 ///
-/// Euclidean, in [0, √d/2]; exact duplicates give 0. Up to three dimensions by a grid whose cells are as wide as the best
-/// distance so far, points entering in a scattered order: O(n) expected for any set (Rabin 1976; Golin et al. 1995).
-/// Above by a sweep along the axis on which most points differ: O(n^(2−1/d)) for even sets, O(n²) at worst.
+/// Euclidean, in [0, √d/2]; exact duplicates give 0. By a sweep along the axis on which most points differ: O(n log n) where
+/// some pair is close, O(n^(2−1/d)) for even sets, O(n²) at worst. Up to three dimensions a sweep that looks at more
+/// than 256 pairs a point gives up for a grid whose cells are as wide as the best distance so far, points entering
+/// in a scattered order: O(n) expected for any set (Rabin 1976; Golin et al. 1995).
 /// In the plane, dividing by √(2/(√3 n)) gives the share of the densest packing's distance.
 pub fn min_toroidal_distance(points: &Points) -> Option<f64> {
     match points.dimension() {
         _ if points.n() < 2 => None,
-        1 => Some(nearest_by_grid::<1>(points).sqrt()),
-        2 => Some(nearest_by_grid::<2>(points).sqrt()),
-        3 => Some(nearest_by_grid::<3>(points).sqrt()),
-        _ => Some(nearest_by_sweep(points).sqrt()),
+        1 => Some(nearest_by_sweep(points, ENOUGH).unwrap_or_else(|| nearest_by_grid::<1>(points)).sqrt()),
+        2 => Some(nearest_by_sweep(points, ENOUGH).unwrap_or_else(|| nearest_by_grid::<2>(points)).sqrt()),
+        3 => Some(nearest_by_sweep(points, ENOUGH).unwrap_or_else(|| nearest_by_grid::<3>(points)).sqrt()),
+        _ => nearest_by_sweep(points, usize::MAX).map(f64::sqrt),
     }
 }
+
+/// Pairs a point that a sweep looks at before the grid is faster.
+const ENOUGH: usize = 256;
 
 /// Points by cells of the torus; cells share the places of a table, which costs comparisons and loses nothing.
 struct CellGrid {
@@ -211,8 +215,8 @@ fn nearest_by_grid<const D: usize>(points: &Points) -> f64 {
 }
 
 /// Smallest squared distance of at least two points: points are compared only while one coordinate alone is closer than
-/// the best pair so far.
-fn nearest_by_sweep(points: &Points) -> f64 {
+/// the best pair so far. `None` where that takes more than so many pairs a point.
+fn nearest_by_sweep(points: &Points, pairs_a_point: usize) -> Option<f64> {
     let distinct = |axis: &usize| {
         let mut values = points.axis(*axis);
         values.sort_by(f64::total_cmp);
@@ -224,6 +228,7 @@ fn nearest_by_sweep(points: &Points) -> f64 {
     sorted.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
     let n = sorted.len();
     let mut nearest = f64::INFINITY;
+    let mut left = n.saturating_mul(pairs_a_point);
     for (i, from) in sorted.iter().enumerate() {
         for step in 1..n {
             let to = sorted[(i + step) % n];
@@ -233,13 +238,17 @@ fn nearest_by_sweep(points: &Points) -> f64 {
             if ahead > 0.5 || ahead * ahead > nearest * (1.0 + 4.0 * f64::EPSILON) {
                 break;
             }
+            if left == 0 {
+                return None;
+            }
+            left -= 1;
             nearest = nearest.min(squared_distance(from, to));
         }
         if nearest == 0.0 {
             break;
         }
     }
-    nearest
+    Some(nearest)
 }
 
 /// Squared Euclidean distance on the torus.
@@ -349,7 +358,7 @@ mod tests {
             .expect("equal");
     }
 
-    /// In space the grid, in four dimensions the sweep: against all pairs.
+    /// The sweep and the grid against all pairs.
     #[test]
     fn the_smallest_distance_in_one_to_four_dimensions_is_that_of_all_pairs() {
         let sets = (1..=4_usize, prop::collection::vec(prop::collection::vec(coordinate(), 4), 2..80));
@@ -360,6 +369,10 @@ mod tests {
                 let pairs = (0..set.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
                 let twin = pairs.map(|(i, j)| squared_distance(set[i], set[j])).fold(f64::INFINITY, f64::min);
                 prop_assert_eq!(min_toroidal_distance(&points), Some(twin.sqrt()));
+                let by_grid = [nearest_by_grid::<1>, nearest_by_grid::<2>, nearest_by_grid::<3>];
+                if let Some(by_grid) = by_grid.get(d - 1) {
+                    prop_assert_eq!(by_grid(&points), twin);
+                }
                 Ok(())
             })
             .expect("equal");
@@ -371,6 +384,7 @@ mod tests {
         let mut set: Vec<[f64; 2]> =
             (0..3000).map(|i| [0.3 + 1e-9 * f64::from(i % 50), 0.6 + 1e-9 * f64::from(i / 50)]).collect();
         assert!((min_toroidal_distance(&plane(&set)).expect("many") - 1e-9).abs() < 1e-15);
+        assert!((nearest_by_grid::<2>(&plane(&set)).sqrt() - 1e-9).abs() < 1e-15);
         set.extend([[0.5, 0.5], [0.5 + f64::EPSILON / 2.0, 0.5]]);
         assert_eq!(min_toroidal_distance(&plane(&set)), Some(f64::EPSILON / 2.0));
     }
