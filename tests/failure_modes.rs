@@ -1,6 +1,7 @@
 //! Where methods fail (docs/failures.md): every failure of the catalogue as a check that runs, a group a test.
 //!
-//! All statistical checks of the registry together raise a false alarm with probability at most 1e-7; seeds are fixed. With
+//! All statistical checks of the registry, here and in the other tests that run some of them, have one false-alarm rate together; seeds
+//! are fixed. False alarms: 1e-7. With
 //! `-- --nocapture` each check says what it saw.
 
 use std::collections::BTreeSet;

@@ -194,7 +194,7 @@ const FOUR: (u32, &str) = (48, r#""spp": 32, "noise": 0.5"#);
 /// Over 1728 pixel-channels a pilot's error is measured to 2.2 %, the least of three is about 2 % too low; the noise of K
 /// batches is measured to √(2/1728/(2K − 1)), 3.4 % and less, and its upper end lies √3 · 1.96 of these above, as a pixel counts
 /// as one number: 12, 7, 4, 3, 2 % for K = 1, 2, 4, 8, 16. With that the nearest border (12.5 of 16) is 20 % away, seven
-/// standard deviations: one false alarm in 10⁹ over 4 × 12 seeds. A half that used a batch twice, or a rule on squares
+/// standard deviations: four of 12 seeds each. False alarms: 1e-9. A half that used a batch twice, or a rule on squares
 /// instead of roots, is a factor of two off.
 #[test]
 fn a_reference_has_as_many_batches_as_the_formula_says() {
@@ -217,7 +217,7 @@ fn a_reference_has_as_many_batches_as_the_formula_says() {
 }
 
 /// Noise of K batches is 1/K of one's, here 1/(24 s K), measured to 3.4 % at most (the noise has light tails): the bar is at
-/// six of these, one false alarm in 10⁸. An interval of 95 % that counts three channels as one number is √3 too wide: it
+/// six of these. False alarms: 1e-8. An interval of 95 % that counts three channels as one number is √3 too wide: it
 /// misses the truth once in 1500, six of them once in 250, at a fixed seed.
 #[test]
 fn the_noise_of_a_reference_falls_as_one_over_its_batches() {

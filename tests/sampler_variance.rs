@@ -5,8 +5,8 @@
 //! the exact variance by a t test on those squares, whose own spread carries their kurtosis. Seeds are fixed. The file's
 //! tests share one family: at most 340 tests with a nominal rate of 5e-10. Studentised means of squares fall low too often
 //! (skewness γ = 2.8: a factor exp(γ z³/(3√R)) = 6 at z = 6.9 and R = 20 000, 100 at R = 4000), so the family's
-//! false-alarm rate is below 5e-8. Rows of the reference that have an exact value (20 variances, 20 of E[L2*²]) are held to its own
-//! tolerance besides, |z| < 5.8: 7e-9 each, 3e-7 together, for seeds that were not these.
+//! false-alarm rate is below 5e-8. False alarms: 5e-8. Rows of the reference that have an exact value (20 variances, 20 of E[L2*²]) are held to its own
+//! tolerance besides, |z| < 5.8: 7e-9 each. False alarms: 3e-7.
 
 use sampler_lab::check::samplers::laws::{AxisLaw, set_errors};
 use sampler_lab::check::samplers::reading::Integrand;

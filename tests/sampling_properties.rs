@@ -192,10 +192,10 @@ fn squared_distance(u: [f64; 2], v: [f64; 2]) -> f64 {
 
 /// The sheet read literally, limit by limit, each derived:
 /// stratified, two numbers of one k × k stratum, E = 2/(6k²) = 1/(3n) → 0; Halton, the same point twice, 0; Hammersley, x
-/// twice the same and y under two independent words, 1/6; uniform, 1/3. Family-wise false-alarm rate 1e-7.
+/// twice the same and y under two independent words, 1/6; uniform, 1/3. False alarms: 1e-8.
 #[test]
 fn decisions_of_the_sheet_presets_march_in_step_to_wrong_limits() {
-    let family = Family { tests: 6, false_alarm: 1e-7 };
+    let family = Family { tests: 6, false_alarm: 1e-8 };
     for n in [16, 1024] {
         let seeds = if n == 16 { 2000 } else { 200 };
         let limit = |name: &str, truth: f64| {
@@ -212,10 +212,10 @@ fn decisions_of_the_sheet_presets_march_in_step_to_wrong_limits() {
 /// `ld` in step is right on average and does not converge in any one pixel. With z uniform and c the exclusive or of two
 /// random words, z − z⊕c = Σ ±c_k 2⁻ᵏ, whose mean square over the net is Σ_{k≤m} c_k 4⁻ᵏ plus the square of what the digits
 /// below m leave: mean 1/6 an axis, variance 1/60 + 16⁻ᵐ/45. Two axes: a spread of √(1/30) = 0.18 at every n. The uniform
-/// sampler's variance is 7/(90 n). Six tests of mean and variance, family-wise false-alarm rate 1e-7.
+/// sampler's variance is 7/(90 n). Six tests of mean and variance. False alarms: 1e-8.
 #[test]
 fn the_sheets_ld_stalls_at_a_spread_of_0_18_per_pixel() {
-    let family = Family { tests: 6, false_alarm: 1e-7 };
+    let family = Family { tests: 6, false_alarm: 1e-8 };
     let check = |name: &str, n: u32, variance: f64| {
         let means = pairings(spec(name), n, 4000, squared_distance);
         let squares: Vec<f64> = means.iter().map(|m| (m - 1.0 / 3.0).powi(2)).collect();

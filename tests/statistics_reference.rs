@@ -209,8 +209,11 @@ fn small_sets_meet_their_exact_discrepancies() {
         assert_certified(&points, &found, name);
         // The reference's own box, which may be another one with the same gap.
         let theirs = &case["values"]["star"]["attained_at"];
-        let side = if theirs["box"] == "open" { Side::Open } else { Side::Closed };
-        assert_certified(&points, &Star { value: truth, corner: numbers(&theirs["corner"]), side }, name);
+        assert_eq!(theirs.is_null(), dimension == 1, "{name}: the reference names no interval on the line");
+        if !theirs.is_null() {
+            let side = if theirs["box"] == "open" { Side::Open } else { Side::Closed };
+            assert_certified(&points, &Star { value: truth, corner: numbers(&theirs["corner"]), side }, name);
+        }
         let t = case["values"]["t_base2"].as_u64();
         assert_eq!(t_value(&points).map(u64::from), t, "{name} t");
         let distance = &case["values"]["min_toroidal_distance"];

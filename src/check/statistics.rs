@@ -349,7 +349,8 @@ mod tests {
     /// With a quarter of the replicates; the failures' own test file runs theirs.
     #[test]
     fn every_check_of_the_group_passes() {
-        let settings = Settings { effort: 0.25, ..Settings::default() };
+        // False alarms: stated in tests/failure_modes.rs, with those of all checks of the registry.
+        let settings = Settings { effort: 0.25, alpha: 1e-7, ..Settings::default() };
         for check in checks() {
             let found = run(&check, &settings).finding;
             println!("{}: {}", check.name, found.says);

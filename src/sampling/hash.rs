@@ -112,6 +112,7 @@ pub const fn unit_f32(fraction: u32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stats::hypothesis::chi2_upper_tail;
 
     #[test]
     fn the_largest_fraction_stays_below_one() {
@@ -133,8 +134,7 @@ mod tests {
     }
 
     /// χ² over all permutations of 3 and 4, and over the ordered pairs (π(0), π(1)) and (π(3), π(n−1)) for larger n.
-    /// 11 tests; with z = (χ² − df)/√(2 df) below 7 the false-alarm rate is under 1e-6 (χ² with df ≥ 5, Laurent–Massart
-    /// 2000, gives 2e-8 at df = 200). A pair twice as likely as it should be adds z > 100.
+    /// A pair twice as likely as it should be adds 400 to χ². False alarms: 1.2e-8 (12 tests of 1e-9).
     #[test]
     fn permutations_are_equally_likely() {
         for n in [3u32, 4] {
@@ -148,7 +148,7 @@ mod tests {
             let expected = 48_000.0 / cells as f64;
             let chi2: f64 = counts.values().map(|&c| (f64::from(c) - expected).powi(2) / expected).sum();
             let df = cells as f64 - 1.0;
-            assert!((chi2 - df) / (2.0 * df).sqrt() < 8.0, "n {n}: χ² {chi2} with {df} degrees of freedom");
+            assert!(chi2_upper_tail(chi2, df) > 1e-9, "n {n}: χ² {chi2} with {df} degrees of freedom");
         }
         for n in [5u32, 8, 12, 16, 28] {
             for (a, b) in [(0, 1), (3, n - 1)] {
@@ -162,8 +162,7 @@ mod tests {
                     counts.iter().filter(|&&c| c > 0).map(|&c| (f64::from(c) - 400.0).powi(2) / 400.0).sum();
                 assert_eq!(counts.iter().filter(|&&c| c > 0).count() as u32, n * (n - 1));
                 let df = f64::from(n * (n - 1) - 1);
-                let z = (chi2 - df) / (2.0 * df).sqrt();
-                assert!(z < 7.0, "n {n}, places {a} and {b}: χ² {chi2}, z {z}");
+                assert!(chi2_upper_tail(chi2, df) > 1e-9, "n {n}, places {a} and {b}: χ² {chi2} with {df}");
             }
         }
     }

@@ -316,7 +316,8 @@ mod tests {
     }
 
     /// Independent samples: RMSE ~ n^−½. 400 experiments of 8 replicates at 6 n: a true 95 % has a standard error of
-    /// 1.1 %, the bounds are 4.6 and 4.1 of them (false alarm about 2e-5 on this one seed).
+    /// 1.1 %; fewer than 350 hits have probability 4e-9, all 400 have 1e-9. Intervals of 86 % or less would mostly fail.
+    /// False alarms: 5e-9.
     #[test]
     fn intervals_of_a_monte_carlo_slope_hold_one_half_at_their_stated_rate() {
         let mut rng = Pcg32::new(5, 5);
@@ -328,6 +329,6 @@ mod tests {
             assert!((fit.slope + 0.5).abs() < 0.3 && high - low < 0.5);
             hits += i32::from(low <= -0.5 && -0.5 <= high);
         }
-        assert!((360..=398).contains(&hits), "{hits} of 400");
+        assert!((350..=399).contains(&hits), "{hits} of 400");
     }
 }

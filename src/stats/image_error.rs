@@ -377,7 +377,7 @@ mod tests {
     }
 
     /// 9900 pairs of pixels, three channels sharing half their noise: the standard error is below 0.01; the bound is
-    /// six of them (a false alarm of 2e-9 on this one seed).
+    /// six of them on this one seed. False alarms: 2e-9.
     #[test]
     fn independent_errors_do_not_correlate_even_when_the_references_are_noisy() {
         let mut normal = Normal::new(2);
@@ -470,7 +470,7 @@ mod tests {
     }
 
     /// Of 4000 trials at a true 95 %, the share has a standard error of 0.0034; 0.93 and 0.97 are 5.8 of them away,
-    /// a false alarm below 1e-8 a number. The first pair of references sees a large error (first order of the noise
+    /// each of two numbers is beyond with probability 1e-8. False alarms: 2e-8. The first pair of references sees a large error (first order of the noise
     /// rules), the second a tiny one (second order rules).
     #[test]
     fn the_interval_of_a_deterministic_image_covers_the_truth_at_its_stated_rate() {
