@@ -311,9 +311,9 @@ fn bias(question: &Question, settings: &Settings, level: f64) -> Finding {
         "nothing is random, so all of its error is bias; ".to_owned()
     };
     says += &format!(
-        "{} of {} tiles differ, at worst {} by {} (t = {}); the whole image is off by {}",
+        "{} of {} places (tiles and the whole image) differ, at worst {} by {} (t = {}); the whole image is off by {}",
         compared.differing(0.5 * level),
-        compared.places.len() - 1,
+        compared.places.len(),
         worst.name,
         relative(worst.mean - worst.expected, worst.expected.abs()),
         worst.t.map_or("none, nothing varies".to_owned(), |t| format!("{t:.1}")),
