@@ -500,7 +500,19 @@ impl<'a> Run<'a> {
         let reference = self.reference(&work.reference_id)?;
         let (e, error_autocorrelation) = measure::ensemble(&members, &reference);
         let exposure = self.plan.exposure(&work.scene);
-        let flips: Vec<f64> = members.iter().map(|image| reference.flip(image, exposure).mean).collect();
+        // What a member's row says of the same comparison need not be looked at twice.
+        let known = |id: &String| match self.rows.get(id) {
+            Some(Row::Image(row)) => {
+                row.errors
+                    .as_ref()
+                    .filter(|e| e.reference_id == work.reference_id && e.metrics_algorithm == item.metrics_algorithm)?
+                    .flip
+            }
+            _ => None,
+        };
+        let flip =
+            |(id, image): (&String, &Arc<Image>)| known(id).unwrap_or_else(|| reference.flip(image, exposure).mean);
+        let flips: Vec<f64> = work.members.iter().zip(&members).map(flip).collect();
         Ok(EnsembleRow {
             schema: SCHEMA,
             id: item.id.clone(),
