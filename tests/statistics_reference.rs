@@ -207,10 +207,12 @@ fn small_sets_meet_their_exact_discrepancies() {
         let truth = number(&case["values"]["star"]["value"]);
         assert!((found.value - truth).abs() <= 1e-14, "{name} star: {} against {truth}", found.value);
         assert_certified(&points, &found, name);
-        // The reference's own box, which may be another one with the same gap.
+        // The reference's own box, which may be another one with the same gap; the set in one dimension is given without.
         let theirs = &case["values"]["star"]["attained_at"];
         let side = if theirs["box"] == "open" { Side::Open } else { Side::Closed };
-        assert_certified(&points, &Star { value: truth, corner: numbers(&theirs["corner"]), side }, name);
+        if theirs.is_object() {
+            assert_certified(&points, &Star { value: truth, corner: numbers(&theirs["corner"]), side }, name);
+        }
         let t = case["values"]["t_base2"].as_u64();
         assert_eq!(t_value(&points).map(u64::from), t, "{name} t");
         let distance = &case["values"]["min_toroidal_distance"];
