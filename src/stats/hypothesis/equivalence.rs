@@ -309,15 +309,15 @@ mod tests {
         assert!(!variance_ratio_equivalence(&many, &other, [1.0 - 0.9 * m, 1.0 + 0.9 * m], family).holds());
     }
 
-    /// At the margin itself equivalence is claimed at the level, 5 %: 2000 runs a kind, 5 standard errors (2.4 %) allowed above and
-    /// below. For the variance of uniform numbers (kurtosis 1.8) too, where a χ² interval would be off by a third.
+    /// At the margin itself equivalence is claimed at the level, 5 %: 2000 runs a kind, of which 45 to 164 with all but probability 7e-10.
+    /// False alarms: 5e-9. For the variance of uniform numbers (kurtosis 1.8) too, where a χ² interval would be off by a third.
     #[test]
     fn equivalence_is_claimed_falsely_as_often_as_stated() {
         let mut rng = Pcg64::new(32, 1);
         let family = Family::one(0.05);
         let mut share = |name: &str, run: &mut dyn FnMut(&mut Pcg64) -> Verdict| {
             let claimed = (0..2_000).filter(|_| run(&mut rng).holds()).count();
-            assert!((52..=149).contains(&claimed), "{name}: {claimed} of 2000");
+            assert!((45..=164).contains(&claimed), "{name}: {claimed} of 2000");
         };
         share("mean", &mut |rng| equivalence_test(&draws(rng, 30, 0.3), 0.0, 0.3, family));
         share("two means", &mut |rng| equivalence_of_means(&draws(rng, 30, 0.3), &draws(rng, 60, 0.0), 0.3, family));
