@@ -7,6 +7,7 @@ use crate::stats::hypothesis::{
     mean_ratio_equivalence, sidak, two_sided, variance_equivalence, welch,
 };
 use crate::stats::image_error::mse_unbiased;
+use crate::stats::tails::HEAVY_TAIL_LEVEL;
 use crate::stats::{
     Bootstrap, Decision, Family, Moments, Pairing, Tails, Trial, binomial_test, equivalence_test, fisher_test,
     rmse_ratio, student_t_quantile, t_interval, t_test, welch_test,
@@ -336,8 +337,9 @@ fn heavy_tails(context: &Context) -> Finding {
     tally.fact(format!("Student's t alone fails {wrong} of {runs} at a stated 0.1 %"), wrong > runs / 50);
     let mut draws = Draws::new(context, 1);
     let normal = (0..runs).filter(|_| Tails::of(&draws.normals(200)).is_some_and(|t| t.are_heavy())).count();
-    // At most HEAVY_TAIL_LEVEL = 1e-4 each; five of 300 by chance: 2e-10.
-    tally.fact(format!("{normal} of {runs} normal sets are flagged"), normal < 5);
+    // Beyond doubt more often than stated: one chance in 10⁹, for any number of runs.
+    let [least, _] = clopper_pearson(normal as u64, u64::from(runs), 1.0 - 2e-9);
+    tally.fact(format!("{normal} of {runs} normal sets are flagged"), least <= HEAVY_TAIL_LEVEL);
     tally.saying(format!("{flagged} of {runs} heavy sets flagged, {normal} normal ones; t alone would fail {wrong}"))
 }
 

@@ -50,6 +50,8 @@ pub struct Tally {
     /// The test nearest to failing: how near (below 1 fails), its words, statistic, p-value and threshold.
     worst: Option<Worst>,
     detects: Option<f64>,
+    /// The largest tolerance of the exact tests.
+    tolerance: Option<f64>,
 }
 
 #[derive(Debug)]
@@ -95,7 +97,7 @@ impl Tally {
         let what = what.into();
         let difference = (found - expected).abs();
         let holds = difference <= tolerance;
-        self.detects = Some(self.detects.map_or(tolerance, |d| d.max(tolerance)));
+        self.tolerance = Some(self.tolerance.map_or(tolerance, |t| t.max(tolerance)));
         let margin = if holds { 1.0 + (1.0 - difference / tolerance.max(f64::MIN_POSITIVE)) } else { 0.0 };
         let said = || format!("{what}: expected {expected} ± {tolerance:e}, found {found}");
         let worst = Worst {
@@ -151,7 +153,8 @@ impl Tally {
             p_value: worst.p_value,
             threshold: worst.threshold,
             false_alarm: 0.0,
-            detects: self.detects.filter(|d| d.is_finite()),
+            // A tolerance has the unit of its numbers and is no power: it speaks where nothing was tested at a level.
+            detects: self.detects.or(self.tolerance).filter(|d| d.is_finite()),
             tests: self.tests,
             says,
         }

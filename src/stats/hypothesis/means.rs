@@ -12,7 +12,7 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 pub(super) const NOT_FINITE: &str = "a value is not finite";
 
 /// Do `a` and `b` differ by no more than rounding?
-pub(super) fn same_but_for_rounding(a: f64, b: f64) -> bool {
+pub(in crate::stats) fn same_but_for_rounding(a: f64, b: f64) -> bool {
     (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
 
@@ -54,11 +54,8 @@ pub fn z_test(value: f64, exact: f64, standard_error: f64, family: Family) -> Ve
 
 /// The common end of both: a t statistic at `df` degrees of freedom (∞ for the normal), and its power.
 fn against_exact(value: f64, exact: f64, error: f64, df: f64, family: Family) -> Verdict {
-    // Shifted by the bias, T is outside ± the critical value with probability POWER once the bias exceeds both
-    // quantiles; for Student this treats the estimated error as fixed, which is good to its relative spread.
     let df = if planted(Mutant::NormalForStudent) { f64::INFINITY } else { df };
-    let critical = student_two_sided_inverse(family.per_test(), df);
-    let detects = Some((critical + student_t_quantile(POWER, df)) * error);
+    let detects = Some(detected_shift(student_two_sided_inverse(family.per_test(), df), df) * error);
     let answer = match definite(value, exact, error) {
         Some(outcome) => Verdict::new(family, outcome),
         None => {
@@ -67,6 +64,16 @@ fn against_exact(value: f64, exact: f64, error: f64, df: f64, family: Family) ->
         }
     };
     Verdict { detects, ..answer }
+}
+
+/// The shift, in true standard errors, at which Student's T exceeds `critical` with probability [`POWER`].
+///
+/// The noncentral t distribution by its normal approximation, δ = c (1 − 1/(4ν)) + z √(1 + c²/(2ν)) (Abramowitz & Stegun 26.7.10): an
+/// estimated error spreads T by 1/√(2ν) of itself, which the quantiles of the central one leave out. Its last term is raised by 1/(3ν), so
+/// that the true power, by quadrature, is 0.989 to 0.993 from 3 values on, at levels from 10⁻² to 10⁻⁹.
+fn detected_shift(critical: f64, df: f64) -> f64 {
+    let spread = (1.0 + critical * critical / (2.0 * df)).sqrt() * (1.0 + 1.0 / (3.0 * df));
+    critical * (1.0 - 1.0 / (4.0 * df)) + student_t_quantile(POWER, f64::INFINITY) * spread
 }
 
 /// Welch's comparison of two means.
@@ -119,8 +126,8 @@ pub fn welch_test(a: &[f64], b: &[f64], family: Family) -> Verdict {
     let (mean_a, mean_b) = (ma.mean().unwrap_or(f64::NAN), mb.mean().unwrap_or(f64::NAN));
     let error = libm::hypot(ma.standard_error().unwrap_or(f64::NAN), mb.standard_error().unwrap_or(f64::NAN));
     let freedom = result.df.unwrap_or(f64::INFINITY);
-    let detects =
-        Some((student_two_sided_inverse(family.per_test(), freedom) + student_t_quantile(POWER, freedom)) * error);
+    let critical = student_two_sided_inverse(family.per_test(), freedom);
+    let detects = Some(detected_shift(critical, freedom) * error);
     let answer = match (definite(mean_a, mean_b, error), result.t) {
         (Some(outcome), _) => Verdict::new(family, outcome),
         (None, Some(t)) => Verdict::tested(family, t, result.p_two_sided),

@@ -38,6 +38,7 @@ pub use equivalence::{
     equivalence_of_means, equivalence_test, mean_ratio_equivalence, paired_ratio_equivalence, variance_equivalence,
     variance_ratio_equivalence,
 };
+pub(in crate::stats) use means::same_but_for_rounding;
 pub use means::{
     WelchResult, chi2_upper_tail, normal_factor, normal_tail, t_test, two_sided, welch, welch_test, z_test,
 };

@@ -43,11 +43,11 @@ pub fn binomial_test(successes: u64, trials: u64, p: f64, family: Family) -> Ver
     }
     let [low, high] = binomial_tails(successes, trials, p);
     let verdict = Verdict::tested(family, rate, (2.0 * low.min(high)).min(1.0));
-    Verdict { detects: Some(binomial_detects(trials, p, family.per_test())), ..verdict }
+    Verdict { detects: binomial_detects(trials, p, family.per_test()), ..verdict }
 }
 
 /// See [`binomial_test`].
-fn binomial_detects(trials: u64, p: f64, level: f64) -> f64 {
+fn binomial_detects(trials: u64, p: f64, level: f64) -> Option<f64> {
     // The least count that fails upwards and the largest that fails downwards, by bisection on the monotone tails.
     let first = |fails: &dyn Fn(u64) -> bool| {
         let (mut low, mut high) = (0, trials + 1);
@@ -75,7 +75,11 @@ fn binomial_detects(trials: u64, p: f64, level: f64) -> f64 {
     };
     let up = if too_many > trials { None } else { nearest(&|q| 1.0 - at_most(too_many - 1, q), 1.0) };
     let down = if not_too_few == 0 { None } else { nearest(&|q| at_most(not_too_few - 1, q), 0.0) };
-    (up.map_or(1.0 - p, |q| q - p)).max(down.map_or(p, |q| p - q))
+    let (up, down) = (up.map(|q| q - p), down.map(|q| p - q));
+    // A side on which nothing is found matters where there is room for a bias as large as the other side finds.
+    let found = up.into_iter().chain(down).reduce(f64::max)?;
+    let blind = (up.is_none() && 1.0 - p >= found) || (down.is_none() && p >= found);
+    (!blind).then_some(found)
 }
 
 /// Have two sets of independent trials the same probability of success? Fisher's exact test, two-sided.
@@ -106,12 +110,12 @@ pub fn fisher_test([hits_a, trials_a]: [u64; 2], [hits_b, trials_b]: [u64; 2], f
     let least = (hits_a + hits_b).saturating_sub(trials_b);
     let at_least = if hits_a <= least { 1.0 } else { law.sf(hits_a - 1) };
     let p = (2.0 * at_most.min(at_least)).min(1.0);
-    let detects = Some(fisher_detects([trials_a, trials_b], hits_a + hits_b, family.per_test()));
+    let detects = fisher_detects([trials_a, trials_b], hits_a + hits_b, family.per_test());
     Verdict { detects, ..Verdict::tested(family, statistic, p) }
 }
 
 /// See [`fisher_test`].
-fn fisher_detects([n_a, n_b]: [u64; 2], hits: u64, level: f64) -> f64 {
+fn fisher_detects([n_a, n_b]: [u64; 2], hits: u64, level: f64) -> Option<f64> {
     let (a, b) = (n_a as f64, n_b as f64);
     let shrunk = |p: f64| p.clamp(0.0, 1.0);
     let base = shrunk(hits as f64 / (a + b));
@@ -120,10 +124,10 @@ fn fisher_detects([n_a, n_b]: [u64; 2], hits: u64, level: f64) -> f64 {
     let factor = student_two_sided_inverse(level, f64::INFINITY) + student_t_quantile(POWER, f64::INFINITY);
     let angle = libm::asin(base.sqrt()) + 0.5 * factor * (1.0 / a + 1.0 / b).sqrt();
     if angle >= std::f64::consts::FRAC_PI_2 {
-        return 1.0 - base;
+        return None;
     }
     let sine = libm::sin(angle);
-    shrunk(sine * sine - base + 1.0 / a + 1.0 / b)
+    Some(shrunk(sine * sine - base + 1.0 / a + 1.0 / b))
 }
 
 /// Clopper and Pearson's exact interval of a probability, from `successes` in `trials` at two-sided `confidence`.
