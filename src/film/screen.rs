@@ -33,7 +33,7 @@ pub fn srgb_decode(encoded: f32) -> f32 {
 
 /// One channel on its way to the screen: sRGB(clamp(H(exposure·c)/H(11.2), 0, 1)).
 ///
-/// The curve rises from 0 to [`WHITE`] and has poles below 0, so it is asked within these ends alone: radiance below 0 is black,
+/// The curve rises from 0 to `WHITE` and has poles below 0, so it is asked within these ends alone: radiance below 0 is black,
 /// and the largest that an `f32` holds is white.
 pub fn tone_map(radiance: f32, exposure: f32) -> f32 {
     let exposed = (exposure * radiance).clamp(0.0, WHITE);

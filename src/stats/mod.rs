@@ -7,7 +7,7 @@
 //! |---|---|
 //! | mean, variance, intervals | [`moments`] |
 //! | intervals of anything else, from replicates | [`bootstrap`] |
-//! | speed and accuracy, ratios of both | [`efficiency`] |
+//! | speed and accuracy, ratios of both | [`mod@efficiency`] |
 //! | how far is an image from its reference | [`image_error`], [`trimmed`] |
 //! | how different do two pictures look | [`flip`] |
 //! | do neighbouring pixels err together | [`error_spectrum`], by a transform of any length in [`fourier`] |

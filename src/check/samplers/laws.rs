@@ -2,7 +2,7 @@
 //!
 //! The mean of f over a set has the mean square n⁻² Σᵢⱼ E f(Xᵢ) f(Xⱼ): only the joint law of two points matters. Axes are
 //! randomised independently, so for products f(x, y) = g(x) h(y) that expectation is one number for each axis. An
-//! [`AxisLaw`] gives it for g = x, for the step 1[x < 1/π] and for the boxes of Warnock's formula, for any n, whatever
+//! [`AxisLaw`] gives it for g = x, for the step 1(x < 1/π) and for the boxes of Warnock's formula, for any n, whatever
 //! the points: also where no closed form is known. The closed forms of METHODS §5 are special cases (tested below).
 //!
 //! Nothing here reads the sampler under test: points come from the definitions of the sequences.
@@ -307,9 +307,9 @@ pub struct SetErrors {
     pub y: Error,
     /// f = xy.
     pub product: Error,
-    /// f = 1[x < 1/π].
+    /// f = 1(x < 1/π).
     pub step: Error,
-    /// E[L2*²].
+    /// E(L2*²).
     pub l2_star: f64,
 }
 
@@ -344,7 +344,7 @@ pub fn set_errors(x: &AxisLaw, y: &AxisLaw) -> SetErrors {
     SetErrors { x: of_x, y: of_y, product: error(n, 0.25, first, second), step, l2_star }
 }
 
-/// Variance of the mean of 1[y > x] over an Owen-scrambled (0,m,2)-net in base 2, n = 2ᵐ.
+/// Variance of the mean of 1(y > x) over an Owen-scrambled (0,m,2)-net in base 2, n = 2ᵐ.
 ///
 /// Two-axis Haar levels (k₁, k₂) of this function: σ² = 2^(k₁ − 2k₂)/16 for k₁ < k₂ (a wavelet in y meets the slope of the
 /// integrated one in x), the same mirrored, 0 for k₁ = k₂; one axis: 4⁻ᵏ/16. They add up to ¼. Gain coefficients of the
@@ -381,7 +381,7 @@ fn on_grid(law: &AxisLaw, n: u32) -> Option<OnGrid> {
     steps.iter().all(|p| p.fract() == 0.0).then(|| (steps.iter().map(|&p| p as u32).collect(), shifted, moves))
 }
 
-/// Error of the mean of 1[y > x] over n = 2ᵐ points whose coordinates are multiples of 1/n, each axis fixed, digitally or
+/// Error of the mean of 1(y > x) over n = 2ᵐ points whose coordinates are multiples of 1/n, each axis fixed, digitally or
 /// toroidally shifted: all n² shifts of the top m digits. The digits below are the same in all points of an axis: two
 /// numbers that tie in the top digits are told apart by them, all ties alike, either way equally often; a fixed axis has
 /// none and is the smaller. `None` where an axis has another law, or for points off the grid.

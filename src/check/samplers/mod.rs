@@ -2,7 +2,7 @@
 //!
 //! | what is certified | for | file |
 //! |---|---|---|
-//! | mean and mean square error of x, y, xy, step (diagonal, disk), E[L2*²] | every legal sampler, three decisions | [`variance`], exact values from [`laws`] |
+//! | mean and mean square error of x, y, xy, step (diagonal, disk), E(L2*²) | every legal sampler, three decisions | [`variance`], exact values from [`laws`] |
 //! | numbers in [0, 1) | every legal sampler, counts up to 2²⁴ | [`range`] |
 //! | (0,m,2)-nets on integers and floats | every block of `ld` and `sobol`, whole Hammersley sets | [`nets`] |
 //! | each index's own distribution over seeds | every legal sampler, every index, three decisions | [`marginals`] |

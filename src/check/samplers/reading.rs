@@ -104,9 +104,9 @@ pub enum Integrand {
     Y,
     /// xy.
     Product,
-    /// 1[x < 1/π].
+    /// 1(x < 1/π).
     Step,
-    /// 1[y > x].
+    /// 1(y > x).
     Diagonal,
     /// 1[x² + y² < 2/π]: a quarter disk.
     Disk,

@@ -5,11 +5,11 @@
 //!
 //! | decision | n | mean and mean square of the error of | exact value from |
 //! |---|---|---|---|
-//! | pixel (dimensions 0–1) | 16 | x, y, xy, 1[x < 1/π]; E[L2*²] | [`laws`](super::laws): pairs of points |
-//! | | | 1[y > x] where the set is on the grid of n, jittered, random or an Owen net | all n² shifts, or a closed form |
+//! | pixel (dimensions 0–1) | 16 | x, y, xy, 1(x < 1/π); E(L2*²) | [`laws`](super::laws): pairs of points |
+//! | | | 1(y > x) where the set is on the grid of n, jittered, random or an Owen net | all n² shifts, or a closed form |
 //! | | | quarter disk for `uniform` | 1/(4n) |
-//! | light point (dimensions 5–6 of `joint`) | 24 | x, y, xy, 1[x < 1/π] | pairs |
-//! | light pick (dimension 4 of `joint`) | 24 | x, 1[x < 1/π] | pairs |
+//! | light point (dimensions 5–6 of `joint`) | 24 | x, y, xy, 1(x < 1/π) | pairs |
+//! | light pick (dimension 4 of `joint`) | 24 | x, 1(x < 1/π) | pairs |
 //!
 //! Without randomisation the error itself is exact and the same for every seed.
 //!
@@ -83,7 +83,7 @@ pub fn laws(spec: SamplerSpec, tickets: &Tickets, decision: Decision, n: u32) ->
     (0..decision.dimensions()).map(law).collect()
 }
 
-/// Everything exact that is known of a decision's set of `n` points (a count that the sampler takes), and E[L2*²].
+/// Everything exact that is known of a decision's set of `n` points (a count that the sampler takes), and E(L2*²).
 pub fn anchors(spec: SamplerSpec, tickets: &Tickets, decision: Decision, n: u32) -> (Vec<Anchor>, Option<f64>) {
     let laws = laws(spec, tickets, decision, n);
     let anchor = |integrand, error, source| Anchor { integrand, error, source };
@@ -276,7 +276,7 @@ fn center(tickets: &Tickets, tally: &mut Tally) {
 mod tests {
     use super::*;
 
-    /// No sampler is left out: each has exact values in every decision, and E[L2*²] in the pixel's.
+    /// No sampler is left out: each has exact values in every decision, and E(L2*²) in the pixel's.
     #[test]
     fn every_legal_sampler_has_exact_values() {
         let tickets = Tickets::new();

@@ -161,7 +161,7 @@ pub fn star_1d(points: &Points) -> Star {
 /// Exact star discrepancy in the plane, in about O(n log² n) time and 100 bytes a point.
 ///
 /// The corner sweeps in x over the distinct abscissae, once for the open boxes and once for the closed ones (see
-/// [`sweep`]). The box is the worst but for roundings of its gap, 2 ε log₂ n at most, and the value is counted anew from it:
+/// `sweep`). The box is the worst but for roundings of its gap, 2 ε log₂ n at most, and the value is counted anew from it:
 /// within 1e-14 of D* for any n that fits in memory.
 ///
 /// # Panics

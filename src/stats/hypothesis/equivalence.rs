@@ -52,7 +52,7 @@ pub fn mean_ratio_equivalence(a: &[f64], b: &[f64], band: [f64; 2], family: Fami
     ratio_within([a.value, b.value], seen, band, family)
 }
 
-/// As [`mean_ratio_equivalence`] for replicates that share their seeds, a[i] with b[i]: what both have of one seed's luck
+/// As [`mean_ratio_equivalence`] for replicates that share their seeds, `a[i]` with `b[i]`: what both have of one seed's luck
 /// cancels. Undefined where the lists differ in length.
 pub fn paired_ratio_equivalence(a: &[f64], b: &[f64], band: [f64; 2], family: Family) -> Verdict {
     if a.len() != b.len() || a.len() < 2 {
