@@ -10,11 +10,13 @@
 
 mod build;
 mod packet;
+mod wide;
 
 use glam::Vec3;
 
 pub use build::Accel;
-pub use packet::{LANES, Packet};
+pub use packet::{LANES, NOTHING, Packet, Row, column, set_column};
+pub use wide::{Wide, widest};
 
 /// Raised whenever a hit, a distance or a tie may come out differently.
 pub const ALGORITHM: u32 = 1;

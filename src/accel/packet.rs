@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::build::{Accel, Slot};
-use super::{Bounds, Hit, Ray, meet, reciprocal_of, slab};
+use super::{Bounds, Hit, Ray, meet, reciprocal_of, safe_reciprocal, slab};
 
 /// Runs a kernel compiled for the widest vectors this processor has.
 ///
@@ -43,6 +43,23 @@ macro_rules! dispatch {
 /// Rays in a packet.
 pub const LANES: usize = 16;
 
+/// One number for each lane.
+pub type Row = [f32; LANES];
+
+/// One lane's vector.
+#[inline(always)]
+pub fn column(rows: &[Row; 3], lane: usize) -> Vec3 {
+    Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane])
+}
+
+/// Sets one lane's vector.
+#[inline(always)]
+pub fn set_column(rows: &mut [Row; 3], lane: usize, v: Vec3) {
+    rows[0][lane] = v.x;
+    rows[1][lane] = v.y;
+    rows[2][lane] = v.z;
+}
+
 /// Up to [`LANES`] rays in structure-of-arrays form, each with the largest distance that still counts.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
@@ -56,7 +73,7 @@ pub struct Packet {
 }
 
 /// No triangle.
-const NOTHING: u32 = u32::MAX;
+pub const NOTHING: u32 = u32::MAX;
 
 impl Default for Packet {
     fn default() -> Self {
@@ -89,6 +106,26 @@ impl Packet {
         }
         self.limit[lane] = limit;
         self.triangle[lane] = NOTHING;
+    }
+
+    /// Puts a ray into every lane, by coordinates; hits count at 0 < t < `limit`, and a lane whose limit is −∞ is idle.
+    #[inline(always)]
+    pub fn set_all(&mut self, origin: &[Row; 3], direction: &[Row; 3], limit: &Row) {
+        self.origin = *origin;
+        self.direction = *direction;
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                self.reciprocal[axis][lane] = safe_reciprocal(direction[axis][lane]);
+            }
+        }
+        self.limit = *limit;
+        self.triangle = [NOTHING; LANES];
+    }
+
+    /// The triangle that each lane's ray met, [`NOTHING`] where none, after [`Accel::closest`] or [`Accel::occluded`].
+    #[inline(always)]
+    pub fn triangles(&self) -> &[u32; LANES] {
+        &self.triangle
     }
 
     /// What the lane's ray met, after [`Accel::closest`].

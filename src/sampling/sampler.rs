@@ -138,10 +138,12 @@ impl Sampler {
 }
 
 impl PointSource for Sampler {
+    #[inline(always)]
     fn samples(&self) -> u32 {
         self.samples
     }
 
+    #[inline(always)]
     fn fill_1d(&self, pixel: PixelKey, first: u32, dim: &Dim1, out: &mut [f32]) {
         let source = self.decision(dim.decision());
         let keys = source.keys(pixel);
@@ -151,6 +153,7 @@ impl PointSource for Sampler {
         }
     }
 
+    #[inline(always)]
     fn fill_2d(&self, pixel: PixelKey, first: u32, dim: &Dim2, x: &mut [f32], y: &mut [f32]) {
         assert_eq!(x.len(), y.len());
         let source = self.decision(dim.decision());
@@ -279,7 +282,7 @@ impl DecisionSampler {
         self.shuffle_key = derive(seed, &[SHUFFLE_TAG, if planted(Mutant::ShuffleShared) { 0 } else { decision }]);
     }
 
-    #[inline]
+    #[inline(always)]
     fn keys(&self, pixel: PixelKey) -> Keys {
         let of_pixel = match self.spec.scope {
             _ if planted(Mutant::PixelKeyDropped) => 0,
@@ -297,7 +300,7 @@ impl DecisionSampler {
     }
 
     /// π(i) for `count` ≤ [`BLOCK`] consecutive indices; what follows them is 0.
-    #[inline]
+    #[inline(always)]
     fn places(&self, first: u32, count: usize, keys: &Keys) -> [u32; BLOCK] {
         // Also in release: beyond its count Hammersley's x is 1 and strata begin anew.
         let end = u64::from(first) + count as u64;
@@ -318,7 +321,7 @@ impl DecisionSampler {
     /// R(P(i, axis)) as a 32-bit fraction: hands `put` the number of each place and its fraction.
     ///
     /// What kind of axis this is gets looked at once, so that each loop is straight arithmetic.
-    #[inline]
+    #[inline(always)]
     fn fractions(&self, axis: usize, places: &[u32], keys: &Keys, put: impl FnMut(usize, u32)) {
         let key = keys.axes[axis];
         let (columns, rows) = self.strata;
