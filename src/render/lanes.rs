@@ -261,7 +261,15 @@ impl Lanes {
 
     /// k_a · L_i · (ω_i·n) over the light's probability, if the lane is open and light and surface face each other.
     #[inline(always)]
-    fn receive(&mut self, lane: usize, to: &LightPoint, area: f32, emission: Vec3, probability: f32, open: bool) -> bool {
+    fn receive(
+        &mut self,
+        lane: usize,
+        to: &LightPoint,
+        area: f32,
+        emission: Vec3,
+        probability: f32,
+        open: bool,
+    ) -> bool {
         let arrival = arrival(to, area, &self.surfaces.at(lane));
         let lit = arrival.lit & open;
         let radiance = column(&self.albedo, lane) * (emission * arrival.weight) / probability;
