@@ -37,7 +37,7 @@ fn sin_cos_in_wedges(angle: f32) -> (f32, f32) {
     let (turned, far, negative) = (angle.abs() > first, angle > third, angle < 0.0);
     let turn = if far { -PI } else { -FRAC_PI_2 };
     let turn = if negative { FRAC_PI_2 } else { turn };
-    let x = f64::from(angle) + if turned { turn } else { 0.0 };
+    let x = if turned { f64::from(angle) + turn } else { f64::from(angle) };
     let z = x * x;
     let w = z * z;
     let s = z * x;
@@ -47,6 +47,8 @@ fn sin_cos_in_wedges(angle: f32) -> (f32, f32) {
     let cos = (((1.0 + z * -0.499_999_997_251_031_003_120) + w * 0.041_666_623_323_739_063_189_4) + (w * z) * r) as f32;
     let (sin_turned, cos_turned) = if far { (-sin, -cos) } else { (cos, -sin) };
     let (sin_turned, cos_turned) = if negative { (-cos, sin) } else { (sin_turned, cos_turned) };
+    // The polynomial loses the sign of −0.
+    let sin = if angle == 0.0 { angle } else { sin };
     if turned { (sin_turned, cos_turned) } else { (sin, cos) }
 }
 
