@@ -212,7 +212,8 @@ pub fn run(check: &Check, settings: &Settings) -> Result {
     });
     let finding = match check.kind {
         Kind::Statistical => Finding { false_alarm: context.false_alarm, ..finding },
-        Kind::Exact => Finding { false_alarm: 0.0, ..finding },
+        // A fact without a tolerance: any departure is caught.
+        Kind::Exact => Finding { false_alarm: 0.0, detects: finding.detects.or(Some(0.0)), ..finding },
     };
     Result { name: check.name, group: check.group, claim: check.claim, failures: check.failures, finding }
 }
