@@ -1,5 +1,7 @@
 //! Queries for packets of rays: one traversal of the tree for all lanes.
 
+#![allow(clippy::needless_range_loop, reason = "a lane is a column of several rows at once")]
+
 use glam::Vec3;
 
 use super::build::{Accel, Slot};

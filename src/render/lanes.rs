@@ -3,6 +3,8 @@
 //! Everything between the queries is straight arithmetic over all lanes, which [`widest`](crate::accel::widest) compiles to
 //! vector instructions. What a scene lacks is asked once a packet.
 
+#![allow(clippy::needless_range_loop, reason = "a lane is a column of several rows at once")]
+
 use glam::{Vec2, Vec3};
 
 use crate::accel::{LANES, NOTHING, Packet, Ray, Row, column, set_column};
