@@ -26,7 +26,7 @@ pub fn mirrored(base: u32, mut index: u32) -> (u64, u64) {
 /// Halton (1960), doi:10.1007/BF01386213. For `index` < 2²⁴ and bases up to 53 the value is below 2³², never 1.
 #[inline]
 pub fn radical_inverse(base: u32, index: u32) -> u32 {
-    if planted(Mutant::RadicalInverseInSingle) {
+    if is_in_single() {
         return wrong::radical_inverse(base, index);
     }
     if base == 2 {
@@ -34,6 +34,12 @@ pub fn radical_inverse(base: u32, index: u32) -> u32 {
     }
     let (mirror, power) = mirrored(base, index);
     ((mirror << 32) / power) as u32
+}
+
+/// A planted bug, or false.
+#[inline(always)]
+fn is_in_single() -> bool {
+    planted(Mutant::RadicalInverseInSingle)
 }
 
 /// An axis of Halton's sequence: a base, and as many of its digits as tell `n` indices apart, made ready.
@@ -64,7 +70,7 @@ impl HaltonAxis {
     #[inline(always)]
     pub fn radical_inverses<const N: usize>(&self, indices: &[u32; N]) -> [u32; N] {
         let base = self.base();
-        if base == 2 || planted(Mutant::RadicalInverseInSingle) {
+        if base == 2 || is_in_single() {
             return indices.map(|index| radical_inverse(base, index));
         }
         let mut rest = indices.map(u64::from);

@@ -38,8 +38,8 @@ const COLUMNS: u32 = 48;
 /// Samples of the sampler's replicates, and of the reference, at effort 1.
 const SAMPLES: [f64; 2] = [(1u64 << 24) as f64, (1u64 << 25) as f64];
 
-/// Replicates at effort 1, and the least that a test is made of.
-const REPLICATES: [f64; 2] = [64.0, 16.0];
+/// Most replicates at effort 1, and the least that a test is made of.
+const REPLICATES: [f64; 2] = [1024.0, 16.0];
 
 /// What the noise of a reference may be of the error that it judges.
 pub const REFERENCE_NOISE: f64 = 0.2;
@@ -258,19 +258,21 @@ impl Question {
     }
 
     /// How bright a single sample is taken to be at most, averaged over channels: as the brightest emitter, or twice as bright
-    /// as any lit surface in a quarter of a million samples with independent numbers.
+    /// as any lit surface in a quarter of a million samples with independent numbers (as bright, where albedo is shown: nothing
+    /// is brighter for being nearer).
     fn brightest(&self, settings: &Settings) -> std::result::Result<f64, String> {
         let scene = self.unbiased.as_ref().unwrap_or(&self.scene);
         let uniform = SamplerSpec::parse("uniform", Preset::Best).expect("a sampler");
         let average = |c: [f32; 3]| c.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0;
         let emitted: Vec<[f32; 3]> =
             scene.mesh.materials.iter().filter(|m| m.is_emitter).map(|m| m.emission.to_array()).collect();
+        let reserve = if scene.lights.is_some() { 2.0 } else { 1.0 };
         let mut brightest = emitted.iter().copied().map(average).fold(0.0, f64::max);
         for image in 0..(f64::from(1 << 18) / self.size.pixels() as f64).ceil() as u32 {
             let seed = self.seed(settings, 2 << 32, image);
             let image = rendered(scene, &Sampler::new(uniform, &scene.layout, 1, seed).expect("a legal count"))?;
             let lit = image.pixels.iter().filter(|pixel| !emitted.contains(pixel));
-            brightest = lit.map(|&pixel| 2.0 * average(pixel)).fold(brightest, f64::max);
+            brightest = lit.map(|&pixel| reserve * average(pixel)).fold(brightest, f64::max);
         }
         Ok(brightest)
     }
@@ -372,8 +374,8 @@ fn apart(
         .collect();
     let nothing = vec![0.0; differences.len()];
     let allowance = ROUNDING * mean_of_last(&images.ours).abs();
-    // A difference of two samples ranges twice as far as one.
-    let rare = Rare { range: 2.0 * images.brightest, samples: [question.samples_of(images), f64::INFINITY] };
+    // Radiance is not negative: two samples differ by no more than one may have.
+    let rare = Rare { range: images.brightest, samples: [question.samples_of(images), f64::INFINITY] };
     let means = compare(&tiling, &differences, &Truth::Exact(&nothing), Rules { allowance, rare, level });
     Ok(Apart { means, spread: spread_ratio(&images.ours, &decoupled) })
 }
