@@ -88,7 +88,10 @@ impl Context {
 
     /// `usual` replicates in proportion to the effort, at least `least`.
     pub fn replicates(&self, usual: u32, least: u32) -> u32 {
-        ((f64::from(usual) * self.effort).round() as u32).max(least)
+        let replicates = ((f64::from(usual) * self.effort).round() as u32).max(least);
+        #[cfg(feature = "mutants")]
+        planted::note_replicates(replicates);
+        replicates
     }
 
     /// The seed of replicate `index` of the part `part`.
