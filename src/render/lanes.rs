@@ -1,6 +1,6 @@
 //! A packet of samples on its way: numbers, camera rays, surfaces, lights, shadow rays, radiance, a lane for each sample.
 //!
-//! Everything between the queries is straight arithmetic over all lanes, which [`widest`](crate::accel::widest) compiles to
+//! Everything between the queries is straight arithmetic over all lanes, which [`Kernel::run`](crate::accel::Kernel::run) compiles to
 //! vector instructions. What a scene lacks is asked once a packet.
 
 #![allow(clippy::needless_range_loop, reason = "a lane is a column of several rows at once")]

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::accel::{LANES, Row, Wide, column, widest};
+use crate::accel::{LANES, Row, Wide, column};
 use crate::film::Image;
 use crate::mutants::{Mutant, planted};
 use crate::sampling::PointSource;
@@ -91,7 +91,7 @@ pub fn render_while<S: PointSource>(
             let (x0, y0) = ((t % columns) * TILE, (t / columns) * TILE);
             let pixels: Vec<(u32, u32)> =
                 (y0..(y0 + TILE).min(height)).flat_map(|y| (x0..(x0 + TILE).min(width)).map(move |x| (x, y))).collect();
-            let tile = widest(Tile { scene, source, pixels: &pixels, lanes });
+            let tile = scene.accel.kernel().run(Tile { scene, source, pixels: &pixels, lanes });
             if !go_on(pixels.len() as u64 * u64::from(source.samples())) {
                 stopped.store(true, Ordering::Relaxed);
             }
