@@ -96,7 +96,7 @@ fn noise(context: &Context) -> Finding {
     let family = context.family(rows.len() as u32);
     let mut tally = Tally::new();
     for (part, row) in rows.iter().enumerate() {
-        let means = pixel_means(context, row.edge, "uniform", 16, context.replicates(16_384, 64), part as u64);
+        let means = pixel_means(context, row.edge, "uniform", 16, context.replicates(16_384, 2_048), part as u64);
         let squares: Vec<f64> = means.iter().map(|m| (m - row.area).powi(2)).collect();
         let exact = row.variance / 16.0;
         tally.verdict(format!("{:?}", row.edge), &t_test_of_squares(&squares, exact, family), exact);

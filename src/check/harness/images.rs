@@ -80,7 +80,8 @@ pub fn null_tiles(context: &Context) -> Finding {
     };
     let runs = u64::from(context.replicates(1_000, 1_000));
     // Nothing in the scene is brighter than 1.
-    let rare = Rare { range: 1.0, samples: [REPLICATES as f64 * f64::from(SPP); 2] };
+    let samples = [REPLICATES as f64 * f64::from(SPP); 2];
+    let rare = Rare { range: 1.0, samples, pixels_are_independent: true };
     let alarm = |run: u64| -> Option<bool> {
         let (a, b) = (series(run, 0)?, series(run, 1)?);
         Some(compare(&tiling, &a, &Truth::Replicates(&b), Rules { rare, ..RULES }).p < LEVEL)
@@ -136,7 +137,8 @@ fn rare_on_noise(context: &Context, runs: u64) -> [u64; 2] {
             };
             let found = by_place(&(0..REPLICATES).map(|_| image(&mut draws)).collect::<Vec<_>>());
             let exact = vec![exact; found.len()];
-            let rare = Rare { range: HIT + 1.0, samples: [REPLICATES as f64 * f64::from(SPP), f64::INFINITY] };
+            let samples = [REPLICATES as f64 * f64::from(SPP), f64::INFINITY];
+            let rare = Rare { range: HIT + 1.0, samples, pixels_are_independent: true };
             [rare, Rare::NOTHING]
                 .map(|rare| compare(&tiling, &found, &Truth::Exact(&exact), Rules { rare, ..RULES }).p < LEVEL)
         })

@@ -9,7 +9,7 @@ mod images;
 
 use crate::sampling::hash::bits64;
 use crate::stats::hypothesis::{Family, ks_uniform_test, welch};
-use crate::stats::{chi2_test, t_test};
+use crate::stats::{binomial_test, chi2_test, fisher_test, t_test};
 
 use super::{Check, Context, Finding, Kind, Tally};
 use crate::stats::hypothesis::clopper_pearson;
@@ -23,7 +23,7 @@ pub fn checks() -> Vec<Check> {
         Check {
             name: "null-tests",
             group: "harness",
-            claim: "t, Welch's, χ² and Kolmogorov–Smirnov's test raise a false alarm 1 % of the time at a level of 1 %",
+            claim: "t, Welch's, χ² and Kolmogorov–Smirnov's test raise a false alarm 1 % of the time at a level of 1 %, the exact tests of rare outcomes no more",
             failures: &[],
             kind: Kind::Statistical,
             run: null_tests,
@@ -151,9 +151,14 @@ fn null_tests(context: &Context) -> Finding {
             alarms[kind] += u64::from(p.is_nan() || p < LEVEL);
         }
     }
-    let family = context.family(4);
+    let family = context.family(6);
     let mut tally = Tally::new();
     let mut said = Vec::new();
+    for (name, alarms) in exact_alarms(&mut draws, runs) {
+        let words = format!("{name} {}", share(alarms, runs));
+        tally.rate(format!("false alarms at a level of {LEVEL}: {words}"), alarms, runs, [0.0, LEVEL], family);
+        said.push(words);
+    }
     for (name, alarms) in names.into_iter().zip(alarms) {
         let within = [LEVEL * (1.0 - APPROXIMATION), LEVEL * (1.0 + APPROXIMATION)];
         let words = format!("{name} {}", share(alarms, runs));
@@ -161,6 +166,20 @@ fn null_tests(context: &Context) -> Finding {
         said.push(words);
     }
     tally.saying(format!("false alarms at a level of {LEVEL}: {}", said.join(", ")))
+}
+
+/// Exact tests of rare outcomes at [`LEVEL`]: being discrete, they lie at most as often as that.
+fn exact_alarms(draws: &mut Draws, runs: u64) -> [(&'static str, u64); 2] {
+    const ONE: Family = Family { tests: 1, false_alarm: LEVEL };
+    const CHANCE: f64 = 0.03;
+    let (mut binomial, mut fisher) = (0, 0);
+    for _ in 0..runs {
+        let mut hits = |n: u64| (0..n).filter(|_| draws.uniform() < CHANCE).count() as u64;
+        let (a, b) = (hits(60), hits(90));
+        binomial += u64::from(!binomial_test(a, 60, CHANCE, ONE).holds());
+        fisher += u64::from(!fisher_test([a, 60 - a], [b, 90 - b], ONE).holds());
+    }
+    [("binomial", binomial), ("Fisher's", fisher)]
 }
 
 fn null_p_values(context: &Context) -> Finding {

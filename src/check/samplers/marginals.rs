@@ -20,7 +20,7 @@
 //!
 //! With 25 expected counts a cell, χ² has a heavier upper tail than its limit. By exact convolution of 64 cells with Poisson's
 //! counts, (k − 25)²/25 each, beyond the point that χ² passes once in 10⁹ the sum comes 4.8 times as often, once in 10¹¹ 9 times, once in
-//! 10¹⁴ 28 times (of 16 cells with 100 counts 12 times); the levels of these tests lie above 10⁻¹⁴, and a fortieth of the
+//! 10¹⁴ 28 times (of 16 cells with 100 counts 12 times); the levels of these tests are about 10⁻¹⁴, and a fortieth of the
 //! rate pays for it. At 1600 seeds a cell whose probability is off by 1.3 of itself is caught, or a distribution
 //! function off by 0.12.
 

@@ -24,8 +24,8 @@ use super::laws::{AxisLaw, Error, axis_errors, grid_diagonal, owen_diagonal, set
 use super::reading::{HALF_PLACE, Integrand, Reader, Tickets, numbered_specs};
 use crate::check::{Check, Context, Finding, Kind, Tally};
 use crate::sampling::{Decision, Order, Random, SamplerSpec};
-use crate::stats::hypothesis::t_test_of_squares;
-use crate::stats::{Family, Verdict, t_test};
+use crate::stats::hypothesis::{t_test_of_skewed, t_test_of_squares};
+use crate::stats::{Family, Verdict};
 
 /// The checks of variances, one for each randomisation.
 pub fn checks() -> Vec<Check> {
@@ -181,7 +181,7 @@ pub fn judge(what: &str, errors: &[f64], exact: Error, family: Family) -> [Judge
     let zero = if settled { vec![0.0; 2] } else { centred };
     let square = if settled { vec![exact.mean_square; 2] } else { squares };
     [
-        (format!("{what}, mean"), t_test(&zero, 0.0, family), exact.mean_square.sqrt()),
+        (format!("{what}, mean"), t_test_of_skewed(&zero, 0.0, family), exact.mean_square.sqrt()),
         (format!("{what}, mean square"), t_test_of_squares(&square, exact.mean_square, family), exact.mean_square),
     ]
 }

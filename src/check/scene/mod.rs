@@ -19,7 +19,7 @@ use crate::experiment::growth::Sums;
 use crate::film::Image;
 use crate::render::render;
 use crate::sampling::hash::{derive, derive_named};
-use crate::sampling::{Decision, PointSource, Preset, Sampler, SamplerSet, SamplerSpec};
+use crate::sampling::{Decision, PointSource, Preset, Sampler, SamplerSet, SamplerSpec, Scope};
 use crate::scene::compile::{Scene, Stage};
 use crate::scene::config::Estimator;
 use crate::scene::load::LoadedScene;
@@ -40,6 +40,9 @@ const SAMPLES: [f64; 2] = [(1u64 << 24) as f64, (1u64 << 25) as f64];
 
 /// Most replicates at effort 1, and the least that a test is made of.
 const REPLICATES: [f64; 2] = [1024.0, 16.0];
+
+/// Most samples of one image: 16 replicates of that many take a minute on two cores.
+const MAX_IMAGE_SAMPLES: f64 = (1u64 << 26) as f64;
 
 /// What the noise of a reference may be of the error that it judges.
 pub const REFERENCE_NOISE: f64 = 0.2;
@@ -136,6 +139,13 @@ impl Question {
             return Err(Error::input("check", "expected a scene that decides something at random, found none"));
         }
         let taken = Sampler::new(set, &scene.layout, asked, 0)?.samples();
+        let samples = size.pixels() as f64 * f64::from(taken);
+        if samples > MAX_IMAGE_SAMPLES {
+            let what = format!(
+                "expected at most {MAX_IMAGE_SAMPLES:e} samples an image, found {samples:e} ({size} at {taken})"
+            );
+            return Err(Error::input("check: --size and --spp", what));
+        }
         Ok(Self { scene, unbiased, set, asked, taken, size, exact, images: OnceLock::new() })
     }
 
@@ -249,7 +259,14 @@ impl Question {
         let random = self.set.is_random(&self.scene.layout);
         let ours = if random { self.samples_of(images) } else { f64::INFINITY };
         let theirs = if self.exact.is_none() { images.reference_samples } else { f64::INFINITY };
-        Rare { range: images.brightest, samples: [ours, theirs] }
+        let pixels_are_independent = self.pixels_are_independent();
+        Rare { range: images.brightest, samples: [ours, theirs], pixels_are_independent }
+    }
+
+    /// Whether all decisions of the scene read numbers that are random, with a key for each pixel.
+    fn pixels_are_independent(&self) -> bool {
+        let specs = self.scene.layout.claims().iter().map(|claim| self.set.of(claim.decision));
+        specs.into_iter().all(|spec| spec.is_random() && matches!(spec.scope, Scope::Pixel | Scope::Each))
     }
 
     /// Samples of the sampler's replicates together, of one pixel.
@@ -375,7 +392,11 @@ fn apart(
     let nothing = vec![0.0; differences.len()];
     let allowance = ROUNDING * mean_of_last(&images.ours).abs();
     // Radiance is not negative: two samples differ by no more than one may have.
-    let rare = Rare { range: images.brightest, samples: [question.samples_of(images), f64::INFINITY] };
+    let rare = Rare {
+        range: images.brightest,
+        samples: [question.samples_of(images), f64::INFINITY],
+        pixels_are_independent: question.pixels_are_independent(),
+    };
     let means = compare(&tiling, &differences, &Truth::Exact(&nothing), Rules { allowance, rare, level });
     Ok(Apart { means, spread: spread_ratio(&images.ours, &decoupled) })
 }
@@ -441,6 +462,7 @@ fn coupling(question: &Question, settings: &Settings, level: f64) -> Finding {
             Err(bad) => return Finding::broken(bad),
         };
         if let Some((ratio, p)) = spread {
+            let p = (p * tried.len() as f64).min(1.0);
             spreads.push(format!("the {} × {ratio:.2} (p = {p:.1e})", decision.name()));
         }
         let worst = compared.worst();
@@ -536,13 +558,20 @@ fn reference(question: &Question, settings: &Settings, level: f64) -> Finding {
     let [a, b] = images.batches.means();
     let pilots = images.pilots.len() as f64;
     let (mut noises, mut errors) = (Vec::new(), Vec::new());
-    for (at, (&a, &b)) in a.as_flattened().iter().zip(b.as_flattened()).enumerate() {
-        let (a, b) = (f64::from(a), f64::from(b));
+    // One value a pixel: its channels share their samples.
+    let over_channels = |value: &dyn Fn(usize) -> f64| (0..3).map(value).sum::<f64>() / 3.0;
+    for (at, (a, b)) in a.iter().zip(&b).enumerate() {
+        let half = |k: usize| [f64::from(a[k]), f64::from(b[k])];
         let error = |image: &Image| {
-            let x = f64::from(image.pixels.as_flattened()[at]);
-            (x - a) * (x - b)
+            over_channels(&|k| {
+                let ([a, b], x) = (half(k), f64::from(image.pixels[at][k]));
+                (x - a) * (x - b)
+            })
         };
-        noises.push((a - b) * (a - b) / 4.0);
+        noises.push(over_channels(&|k| {
+            let [a, b] = half(k);
+            (a - b) * (a - b) / 4.0
+        }));
         errors.push(images.pilots.iter().map(error).sum::<f64>() / pilots);
     }
     let allowed = REFERENCE_NOISE * REFERENCE_NOISE;
@@ -565,7 +594,11 @@ fn reference(question: &Question, settings: &Settings, level: f64) -> Finding {
         finding.passed = p >= level;
     }
     let root = |x: f64| x.max(0.0).sqrt();
-    let remedy = if finding.passed { "" } else { "; more is to be had with --budget" };
+    let remedy = match (finding.passed, noise > allowed * error) {
+        (false, _) => "; more is to be had with --budget",
+        (true, true) => "; more than allowed, but not shown beyond doubt: --budget decides",
+        (true, false) => "",
+    };
     finding.says = format!(
         "its noise is {:.2e} (RMSE), the error of one image of this sampler {:.2e}: {}, {REFERENCE_NOISE} are allowed \
          (p = {:.1e} of no more){remedy}",

@@ -38,15 +38,18 @@ pub struct Rare {
     /// Samples behind each pixel's mean over all replicates, of what is tested and of what it is compared with; infinite where
     /// nothing is random.
     pub samples: [f64; 2],
+    /// Whether pixels have random numbers of their own; else a tile meets something rare as often as one pixel does.
+    pub pixels_are_independent: bool,
 }
 
 impl Rare {
     /// Nothing rare happens: replicates are as good as normal.
-    pub const NOTHING: Self = Self { range: 0.0, samples: [f64::INFINITY; 2] };
+    pub const NOTHING: Self = Self { range: 0.0, samples: [f64::INFINITY; 2], pixels_are_independent: true };
 
-    /// The second term of the bound, of both sides together, for a mean over `pixels` pixels.
+    /// What may be hidden with probability δ, on both sides together, in a mean over `pixels` pixels.
     fn hidden(&self, pixels: f64, delta: f64) -> f64 {
         let term = self.range * libm::log(2.0 / delta);
+        let pixels = if self.pixels_are_independent { pixels } else { 1.0 };
         self.samples.iter().map(|n| term / (n * pixels)).sum()
     }
 }
@@ -197,7 +200,12 @@ fn one_place(tiling: &Tiling, place: usize, found: &Series, truth: &Truth<'_>, r
         [Some(ours), theirs].map(|m| m.map_or((0.0, 1.0), |m| (m.standard_error().unwrap_or(0.0), m.n() as f64)));
     let error = libm::hypot(errors[0].0, errors[1].0);
     let difference = mean - expected;
-    let slack = rules.allowance + rules.rare.hidden(tiling.pixels(place), rules.level);
+    // Half of the level for what may be hidden, half for the t test.
+    let (hidden, level) = match rules.rare.range {
+        0.0 => (0.0, rules.level),
+        _ => (rules.rare.hidden(tiling.pixels(place), 0.5 * rules.level), 0.5 * rules.level),
+    };
+    let slack = rules.allowance + hidden;
     let left = (difference.abs() - slack).max(0.0);
     if error == 0.0 {
         return Compared { name, mean, expected, t: None, p: if left == 0.0 { 1.0 } else { 0.0 }, detects: slack };
@@ -209,10 +217,11 @@ fn one_place(tiling: &Tiling, place: usize, found: &Series, truth: &Truth<'_>, r
     };
     let df = 1.0 / (share(errors[0]) + share(errors[1]));
     let t = (left / error).copysign(difference);
-    let critical = student_t_quantile(1.0 - 0.5 * rules.level, df);
+    let critical = student_t_quantile(1.0 - 0.5 * level, df);
     // For levels below 10⁻¹⁶ the quantile's argument is 1 and it is infinite; no test of ours is at such a level.
     let detects = (critical + student_t_quantile(0.99, df)) * error + slack;
-    Compared { name, mean, expected, t: Some(t), p: two_sided(t, df), detects }
+    let p = (two_sided(t, df) * rules.level / level).min(1.0);
+    Compared { name, mean, expected, t: Some(t), p, detects }
 }
 
 #[cfg(test)]
@@ -296,7 +305,7 @@ mod tests {
         let tiling = Tiling::new(4, 1);
         let dark = series(4, 5, 64, |_, _| 0.0);
         let with = |samples: f64| {
-            let rare = Rare { range: 1.0, samples: [samples, f64::INFINITY] };
+            let rare = Rare { range: 1.0, samples: [samples, f64::INFINITY], pixels_are_independent: true };
             compare(&tiling, &dark, &Truth::Exact(&[0.01; 5]), Rules { allowance: 0.0, rare, level: 1e-6 }).p
         };
         assert_eq!((with(64.0), with(1e6)), (1.0, 0.0));

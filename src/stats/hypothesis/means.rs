@@ -53,6 +53,13 @@ pub fn t_test_of_squares(squares: &[f64], exact: f64, family: Family) -> Verdict
     t_test(squares, exact, family.for_skewed(seen.max(8f64.sqrt()), squares.len()))
 }
 
+/// As [`t_test`] for values that may be skewed either way, like means of coins: at the level of [`Family::for_skewed`] for the
+/// skewness that is seen.
+pub fn t_test_of_skewed(values: &[f64], exact: f64, family: Family) -> Verdict {
+    let seen = Tails::of(values).map_or(0.0, |tails| tails.skewness);
+    t_test(values, exact, family.for_skewed(seen, values.len()))
+}
+
 /// Is a `value` of known `standard_error` equal to `exact`? Two-sided test on the normal distribution.
 ///
 /// Zero standard error gives a definite answer; a negative or non-finite one is undefined.
