@@ -63,6 +63,7 @@ const FLOORS: &[Floor] = &[
             "error",
         ],
     },
+    Floor { module: "bench", may_use: &["render", "scene", "sampling", "accel", "stats", "points", "film", "error"] },
 ];
 
 /// Outside packages and the rooms that may name them: a replaced package is one room's work.
@@ -373,13 +374,13 @@ fn the_kernels_do_no_input_or_output() {
     }
 }
 
-/// Nothing recorded depends on a clock: only timings of experiments and the binary read one.
+/// Nothing recorded depends on a clock: only timings of experiments, benchmarks and the binary read one.
 #[test]
 fn only_timings_read_a_clock() {
-    for file in sources().iter().filter(|f| !matches!(f.module(), "experiment" | "main")) {
+    for file in sources().iter().filter(|f| !matches!(f.module(), "experiment" | "bench" | "main")) {
         for (place, line) in file.numbered(&file.product) {
             for clock in ["Instant", "SystemTime", "_rdtsc"] {
-                assert!(!has_word(line, clock), "{place}: {clock} outside experiment and main");
+                assert!(!has_word(line, clock), "{place}: {clock} outside experiment, bench and main");
             }
         }
     }
