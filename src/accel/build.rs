@@ -7,7 +7,7 @@ use obvhs::bvh2::leaf_collapser::collapse;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
-use super::{Bounds, Triangle, box_padding};
+use super::{Bounds, Kernel, Triangle, box_padding};
 
 /// Most triangles in a leaf; a leaf's count is stored in 3 bits.
 const LEAF_TRIANGLES: u32 = 8;
@@ -64,6 +64,7 @@ pub struct Accel {
     pub(super) slots: Vec<Slot>,
     /// Levels below the root, which bounds a traversal's stack.
     pub(super) depth: usize,
+    pub(super) kernel: Kernel,
 }
 
 impl Accel {
@@ -74,7 +75,12 @@ impl Accel {
     /// threads, so the tree is a function of its arguments.
     pub fn new(triangles: &[Triangle], reach: f32) -> Self {
         let pad = box_padding(reach);
-        let mut accel = Self { nodes: Vec::new(), slots: Vec::with_capacity(triangles.len()), depth: 0 };
+        let mut accel = Self {
+            nodes: Vec::new(),
+            slots: Vec::with_capacity(triangles.len()),
+            depth: 0,
+            kernel: Kernel::detected(),
+        };
         if triangles.is_empty() {
             return accel;
         }
@@ -85,6 +91,20 @@ impl Accel {
         };
         accel.copy(&tree, &place);
         accel
+    }
+
+    /// The kernel that queries run on.
+    pub fn kernel(&self) -> Kernel {
+        self.kernel
+    }
+
+    /// Makes queries run on another kernel: to compare them, since all give the same bits.
+    ///
+    /// # Panics
+    /// Where this processor cannot run it ([`Kernel::available`]).
+    pub fn set_kernel(&mut self, kernel: Kernel) {
+        assert!(kernel.is_available(), "this processor has no {kernel}");
+        self.kernel = kernel;
     }
 
     /// Bytes that tree and triangles take.

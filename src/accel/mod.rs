@@ -8,13 +8,17 @@
 //! that slab interval. Rounding is monotone, so the interval of every enclosing box contains it, and no tree, traversal
 //! order or packet width can cull it: the answer is a function of ray and triangles alone.
 
+#[cfg(target_arch = "x86_64")]
+mod avx512;
 mod build;
 mod packet;
+mod wide;
 
 use glam::Vec3;
 
 pub use build::Accel;
-pub use packet::{LANES, Packet};
+pub use packet::{LANES, NOTHING, Packet, Row, column, set_column};
+pub use wide::{Kernel, Wide};
 
 /// Raised whenever a hit, a distance or a tie may come out differently.
 pub const ALGORITHM: u32 = 1;

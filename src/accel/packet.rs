@@ -1,47 +1,31 @@
 //! Queries for packets of rays: one traversal of the tree for all lanes.
 
+#![allow(clippy::needless_range_loop, reason = "a lane is a column of several rows at once")]
+
 use glam::Vec3;
 
 use super::build::{Accel, Slot};
-use super::{Bounds, Hit, Ray, meet, reciprocal_of, slab};
-
-/// Runs a kernel compiled for the widest vectors this processor has.
-///
-/// The same source is compiled once for each width: the compiler keeps every IEEE operation and their order (it neither
-/// reassociates nor fuses), so all widths give the same bits.
-macro_rules! dispatch {
-    ($kernel:ident($accel:expr, $packet:expr)) => {{
-        #[cfg(target_arch = "x86_64")]
-        {
-            #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq")]
-            fn avx512(accel: &Accel, packet: &mut Packet) {
-                $kernel(accel, packet);
-            }
-            #[target_feature(enable = "avx2")]
-            fn avx2(accel: &Accel, packet: &mut Packet) {
-                $kernel(accel, packet);
-            }
-            if is_x86_feature_detected!("avx512f")
-                && is_x86_feature_detected!("avx512vl")
-                && is_x86_feature_detected!("avx512bw")
-                && is_x86_feature_detected!("avx512dq")
-            {
-                // SAFETY: the function is safe but for needing the processor features just detected.
-                #[allow(unsafe_code, reason = "calling a function compiled for features that were detected")]
-                return unsafe { avx512($accel, $packet) };
-            }
-            if is_x86_feature_detected!("avx2") {
-                // SAFETY: as above.
-                #[allow(unsafe_code, reason = "calling a function compiled for features that were detected")]
-                return unsafe { avx2($accel, $packet) };
-            }
-        }
-        $kernel($accel, $packet)
-    }};
-}
+use super::{Bounds, Hit, Kernel, Ray, Wide, meet, reciprocal_of, safe_reciprocal, slab};
 
 /// Rays in a packet.
 pub const LANES: usize = 16;
+
+/// One number for each lane.
+pub type Row = [f32; LANES];
+
+/// One lane's vector.
+#[inline(always)]
+pub fn column(rows: &[Row; 3], lane: usize) -> Vec3 {
+    Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane])
+}
+
+/// Sets one lane's vector.
+#[inline(always)]
+pub fn set_column(rows: &mut [Row; 3], lane: usize, v: Vec3) {
+    rows[0][lane] = v.x;
+    rows[1][lane] = v.y;
+    rows[2][lane] = v.z;
+}
 
 /// Up to [`LANES`] rays in structure-of-arrays form, each with the largest distance that still counts.
 #[derive(Debug, Clone)]
@@ -56,7 +40,7 @@ pub struct Packet {
 }
 
 /// No triangle.
-const NOTHING: u32 = u32::MAX;
+pub const NOTHING: u32 = u32::MAX;
 
 impl Default for Packet {
     fn default() -> Self {
@@ -91,6 +75,26 @@ impl Packet {
         self.triangle[lane] = NOTHING;
     }
 
+    /// Puts a ray into every lane, by coordinates; hits count at 0 < t < `limit`, and a lane whose limit is −∞ is idle.
+    #[inline(always)]
+    pub fn set_all(&mut self, origin: &[Row; 3], direction: &[Row; 3], limit: &Row) {
+        self.origin = *origin;
+        self.direction = *direction;
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                self.reciprocal[axis][lane] = safe_reciprocal(direction[axis][lane]);
+            }
+        }
+        self.limit = *limit;
+        self.triangle = [NOTHING; LANES];
+    }
+
+    /// The triangle that each lane's ray met, [`NOTHING`] where none, after [`Accel::closest`] or [`Accel::occluded`].
+    #[inline(always)]
+    pub fn triangles(&self) -> &[u32; LANES] {
+        &self.triangle
+    }
+
     /// What the lane's ray met, after [`Accel::closest`].
     #[inline]
     pub fn hit(&self, lane: usize) -> Option<Hit> {
@@ -101,6 +105,24 @@ impl Packet {
     #[inline]
     pub fn is_occluded(&self, lane: usize) -> bool {
         self.triangle[lane] != NOTHING
+    }
+
+    /// Origins, directions and their reciprocals.
+    #[cfg(target_arch = "x86_64")]
+    pub(super) fn rows(&self) -> (&[Row; 3], &[Row; 3], &[Row; 3]) {
+        (&self.origin, &self.direction, &self.reciprocal)
+    }
+
+    /// Nearest distances so far.
+    #[cfg(target_arch = "x86_64")]
+    pub(super) fn limits(&self) -> &Row {
+        &self.limit
+    }
+
+    /// What a kernel writes.
+    #[cfg(target_arch = "x86_64")]
+    pub(super) fn results(&mut self) -> (&mut Row, &mut [u32; LANES]) {
+        (&mut self.limit, &mut self.triangle)
     }
 
     #[inline(always)]
@@ -170,14 +192,16 @@ impl Packet {
     }
 }
 
-#[inline(always)]
-fn closest_with(accel: &Accel, packet: &mut Packet) {
-    accel.traverse::<false>(packet);
-}
+/// A packet's way through a tree in plain loops over lanes.
+struct PortablePacket<'a, const ANY: bool>(&'a Accel, &'a mut Packet);
 
-#[inline(always)]
-fn occluded_with(accel: &Accel, packet: &mut Packet) {
-    accel.traverse::<true>(packet);
+impl<const ANY: bool> Wide for PortablePacket<'_, ANY> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.0.traverse::<ANY>(self.1);
+    }
 }
 
 /// Nodes waiting on the way down: one for each level of the tree, on the stack for all but degenerate trees.
@@ -186,12 +210,26 @@ const STACK: usize = 96;
 impl Accel {
     /// Finds, for every ray of the packet, the nearest hit below its limit.
     pub fn closest(&self, packet: &mut Packet) {
-        dispatch!(closest_with(self, packet))
+        self.trace_packet::<false>(packet);
     }
 
     /// Finds, for every ray of the packet, whether anything lies below its limit.
     pub fn occluded(&self, packet: &mut Packet) {
-        dispatch!(occluded_with(self, packet))
+        self.trace_packet::<true>(packet);
+    }
+
+    fn trace_packet<const ANY: bool>(&self, packet: &mut Packet) {
+        match self.kernel {
+            #[cfg(target_arch = "x86_64")]
+            Kernel::Avx512 => {
+                // SAFETY: a tree has this kernel only where the processor has these instructions.
+                #[allow(unsafe_code, reason = "calling a function compiled for features that were detected")]
+                unsafe {
+                    super::avx512::trace::<ANY>(self, packet);
+                }
+            }
+            kernel => kernel.run(PortablePacket::<ANY>(self, packet)),
+        }
     }
 
     #[inline(always)]
@@ -261,6 +299,14 @@ impl Accel {
         self.closest(&mut packet);
         packet.hit(0)
     }
+
+    /// Whether one ray meets anything below `limit`: a packet of one.
+    pub fn occluded_one(&self, ray: &Ray, limit: f32) -> bool {
+        let mut packet = Packet::default();
+        packet.set(0, ray, limit);
+        self.occluded(&mut packet);
+        packet.is_occluded(0)
+    }
 }
 
 #[cfg(test)]
@@ -297,23 +343,25 @@ mod tests {
     }
 
     fn agree(triangles: &[Triangle], reach: f32, rays: &[(Ray, f32)]) {
-        let accel = Accel::new(triangles, reach);
+        let mut accel = Accel::new(triangles, reach);
         for chunk in rays.chunks(LANES) {
-            let mut packet = Packet::default();
-            for (lane, (ray, limit)) in chunk.iter().enumerate() {
-                packet.set(lane, ray, *limit);
-            }
-            let mut shadow = packet.clone();
-            let mut portable = packet.clone();
-            closest_with(&accel, &mut portable);
-            accel.closest(&mut packet);
-            assert!((0..LANES).all(|l| portable.hit(l) == packet.hit(l)), "vector widths disagree");
-            accel.occluded(&mut shadow);
-            for (lane, (ray, limit)) in chunk.iter().enumerate() {
-                let truth = brute_force(triangles, reach, ray, *limit);
-                assert_eq!(packet.hit(lane), truth, "{ray:?} up to {limit}");
-                assert_eq!(accel.closest_one(ray, *limit), truth, "alone: {ray:?}");
-                assert_eq!(shadow.is_occluded(lane), truth.is_some());
+            let truths: Vec<Option<Hit>> =
+                chunk.iter().map(|(ray, limit)| brute_force(triangles, reach, ray, *limit)).collect();
+            for kernel in Kernel::available() {
+                accel.set_kernel(kernel);
+                let mut packet = Packet::default();
+                for (lane, (ray, limit)) in chunk.iter().enumerate() {
+                    packet.set(lane, ray, *limit);
+                }
+                let mut shadow = packet.clone();
+                accel.closest(&mut packet);
+                accel.occluded(&mut shadow);
+                for (lane, ((ray, limit), truth)) in chunk.iter().zip(&truths).enumerate() {
+                    assert_eq!(packet.hit(lane), *truth, "{kernel}: {ray:?} up to {limit}");
+                    assert_eq!(shadow.is_occluded(lane), truth.is_some(), "{kernel}: {ray:?} up to {limit}");
+                    assert_eq!(accel.closest_one(ray, *limit), *truth, "{kernel}, alone: {ray:?} up to {limit}");
+                    assert_eq!(accel.occluded_one(ray, *limit), truth.is_some(), "{kernel}, alone: {ray:?}");
+                }
             }
         }
     }

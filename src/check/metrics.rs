@@ -5,6 +5,7 @@ use crate::sampling::hash::bits64;
 use crate::stats::discrepancy::{
     L2Kind, Points, Side, Star, filled_strata, l2, min_toroidal_distance, star, star_2d, t_of_projections, t_value,
 };
+use crate::stats::hypothesis::t_test_of_squares;
 use crate::stats::spectrum::{Spectrum, expected_of_jittered, power_at};
 use crate::stats::t_test;
 
@@ -203,7 +204,7 @@ fn l2_of_random_points(context: &Context) -> Finding {
     let family = context.family(27);
     let mut tally = Tally::new();
     for d in [1, 2, 4_usize] {
-        let sets: Vec<Points> = (0..u64::from(context.replicates(1500, 200)))
+        let sets: Vec<Points> = (0..u64::from(context.replicates(1500, 1000)))
             .map(|r| {
                 let seed = context.seed_of(d as u64, r);
                 Points::new(d, (0..32 * d as u64).map(|i| unit(seed, i)).collect()).expect("in the unit cube")
@@ -212,7 +213,7 @@ fn l2_of_random_points(context: &Context) -> Finding {
         for kind in L2Kind::ALL {
             let squares: Vec<f64> = sets.iter().map(|set| l2(set, kind).squared.unwrap_or(0.0)).collect();
             let truth = kind.expected_squared_of_random(32, d);
-            tally.verdict(format!("E {}² in {d}-D", kind.name()), &t_test(&squares, truth, family), truth);
+            tally.verdict(format!("E {}² in {d}-D", kind.name()), &t_test_of_squares(&squares, truth, family), truth);
         }
     }
     tally.finish()

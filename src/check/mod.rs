@@ -88,7 +88,10 @@ impl Context {
 
     /// `usual` replicates in proportion to the effort, at least `least`.
     pub fn replicates(&self, usual: u32, least: u32) -> u32 {
-        ((f64::from(usual) * self.effort).round() as u32).max(least)
+        let replicates = ((f64::from(usual) * self.effort).round() as u32).max(least);
+        #[cfg(feature = "mutants")]
+        planted::note_replicates(replicates);
+        replicates
     }
 
     /// The seed of replicate `index` of the part `part`.
@@ -212,7 +215,8 @@ pub fn run(check: &Check, settings: &Settings) -> Result {
     });
     let finding = match check.kind {
         Kind::Statistical => Finding { false_alarm: context.false_alarm, ..finding },
-        Kind::Exact => Finding { false_alarm: 0.0, ..finding },
+        // A fact without a tolerance: any departure is caught.
+        Kind::Exact => Finding { false_alarm: 0.0, detects: finding.detects.or(Some(0.0)), ..finding },
     };
     Result { name: check.name, group: check.group, claim: check.claim, failures: check.failures, finding }
 }

@@ -188,14 +188,8 @@ fn t_test_power(context: &Context) -> Finding {
     let (whole, half) = (caught(&mut draws, bias), caught(&mut draws, 0.5 * bias));
     let mut tally = Tally::new();
     let family = context.family(2);
-    let at_most = |name: &str, count: u64, p: f64, tally: &mut Tally| {
-        let [low, high] = clopper_pearson(count, runs, 1.0 - 2.0 * family.per_test());
-        tally.fact(format!("{name}: {count} of {runs} caught, interval {low:.4} to {high:.4}, stated {p}"), {
-            if p > 0.5 { high >= p } else { low <= p }
-        });
-    };
-    at_most("the stated bias", whole, 0.985, &mut tally);
-    at_most("half of it", half, 0.3, &mut tally);
+    tally.rate(format!("the stated bias is caught {whole} times of {runs}"), whole, runs, [0.985, 1.0], family);
+    tally.rate(format!("half of it {half} times of {runs}"), half, runs, [0.0, 0.3], family);
     tally
         .saying(format!("a bias of {bias:.3} standard deviations is caught {whole} times of {runs}, half of it {half}"))
 }
@@ -278,12 +272,9 @@ fn equivalence_rate(context: &Context) -> Finding {
     tally.verdict("ratio of means at the margin", &binomial_test(ratio, runs, 0.05, family), 0.05);
     let variance =
         rate(&mut draws, &|d| variance_equivalence(&d.normals(400), Some(0.0), 1.0 / 1.2, [0.8, 1.2], level).holds());
-    let [low, high] = clopper_pearson(variance, runs, 1.0 - family.per_test());
     // Squares have skewness 2.83: at 400 of them the lower tail of t is heavier, the upper lighter, by √(8/400)(2z² + 1)/6 φ(z) ≈ 1.6 %.
-    tally.fact(
-        format!("variance at the margin: {variance} of {runs}, interval {low:.3} to {high:.3}, within 5 ± 2.5 %"),
-        low <= 0.075 && high >= 0.025,
-    );
+    let what = format!("variance at the margin: {variance} of {runs}, within 5 ± 2.5 %");
+    tally.rate(what, variance, runs, [0.025, 0.075], family);
     tally.saying(format!("claims of equivalence at the margin, 5 % stated: {mean}, {ratio}, {variance} of {runs}"))
 }
 
@@ -308,12 +299,9 @@ fn ratio_coverage(context: &Context) -> Finding {
         covered += u64::from(found.is_some_and(|[low, high]| low <= 2.0 && 2.0 <= high));
     }
     let family = context.family(1);
-    let [low, high] = clopper_pearson(covered, runs, 1.0 - family.per_test());
     let mut tally = Tally::new();
     tally.fact(format!("all {runs} ratios have an interval ({defined})"), defined == runs);
-    tally.fact(format!("coverage {covered} of {runs}, interval {low:.3} to {high:.3}, within 0.92 to 0.98"), {
-        high >= 0.92 && low <= 0.98
-    });
+    tally.rate(format!("coverage {covered} of {runs}, within 0.92 to 0.98"), covered, runs, [0.92, 0.98], family);
     tally.saying(format!("the true ratio 2 lies in {covered} of {runs} intervals"))
 }
 
@@ -331,15 +319,16 @@ fn heavy_tails(context: &Context) -> Finding {
         accused += u32::from(agreement.decision() == Decision::Fails);
         flagged += u32::from(agreement.tails.is_some_and(|t| t.are_heavy()));
     }
+    let family = context.family(4);
+    let mut rate =
+        |what: String, count: u32, within| tally.rate(what, u64::from(count), u64::from(runs), within, family);
     // A set that drew no large value looks harmless: a share of such is allowed, far above what was ever seen.
-    tally.fact(format!("{flagged} of {runs} sets are flagged as heavy-tailed"), 20 * flagged >= 19 * runs);
-    tally.fact(format!("{accused} of {runs} are called biased for sure"), 50 * accused <= runs);
-    tally.fact(format!("Student's t alone fails {wrong} of {runs} at a stated 0.1 %"), wrong > runs / 50);
+    rate(format!("{flagged} of {runs} sets are flagged as heavy-tailed"), flagged, [0.95, 1.0]);
+    rate(format!("{accused} of {runs} are called biased for sure"), accused, [0.0, 0.02]);
+    rate(format!("Student's t alone fails {wrong} of {runs} at a stated 0.1 %"), wrong, [0.02, 1.0]);
     let mut draws = Draws::new(context, 1);
-    let normal = (0..runs).filter(|_| Tails::of(&draws.normals(200)).is_some_and(|t| t.are_heavy())).count();
-    // Beyond doubt more often than stated: one chance in 10⁹, for any number of runs.
-    let [least, _] = clopper_pearson(normal as u64, u64::from(runs), 1.0 - 2e-9);
-    tally.fact(format!("{normal} of {runs} normal sets are flagged"), least <= HEAVY_TAIL_LEVEL);
+    let normal = (0..runs).filter(|_| Tails::of(&draws.normals(200)).is_some_and(|t| t.are_heavy())).count() as u32;
+    rate(format!("{normal} of {runs} normal sets are flagged"), normal, [0.0, HEAVY_TAIL_LEVEL]);
     tally.saying(format!("{flagged} of {runs} heavy sets flagged, {normal} normal ones; t alone would fail {wrong}"))
 }
 

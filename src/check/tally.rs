@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::stats::hypothesis::{Outcome, Verdict};
+use crate::stats::hypothesis::{Family, Outcome, Verdict, binomial_test, clopper_pearson};
 
 /// What a check found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -118,6 +118,46 @@ impl Tally {
         self.add(holds, worst, || format!("not so: {what}"))
     }
 
+    /// Adds a fact about random numbers, with the smallest departure, relative to what is claimed, that fails it with probability
+    /// 0.99 or more.
+    pub fn fact_that_detects(&mut self, what: impl Into<String>, holds: bool, detects: f64) -> bool {
+        self.detects = Some(self.detects.map_or(detects, |d| d.max(detects)));
+        self.fact(what, holds)
+    }
+
+    /// Adds a test of a probability: `count` events in `runs`, which is to lie in [`low`, `high`]. Fails where Clopper and
+    /// Pearson's interval at the confidence of one of the family's tests misses them; exact, so the family's rate holds.
+    ///
+    /// What it detects is relative: how far above `high`, or below `low`, the probability has to be.
+    pub fn rate(
+        &mut self,
+        what: impl Into<String>,
+        count: u64,
+        runs: u64,
+        [low, high]: [f64; 2],
+        family: Family,
+    ) -> bool {
+        let confidence = 1.0 - family.per_test();
+        let [least, most] = clopper_pearson(count, runs, confidence);
+        let p = binomial_test(count, runs, high, family).p_value.filter(|_| count as f64 > high * runs as f64);
+        let p = p
+            .or_else(|| binomial_test(count, runs, low, family).p_value.filter(|_| (count as f64) < low * runs as f64));
+        if let Some(detects) = rate_detected(runs, [low, high], confidence) {
+            self.detects = Some(self.detects.map_or(detects, |d| d.max(detects)));
+        }
+        let holds = least <= high && most >= low;
+        let what = what.into();
+        let p = p.unwrap_or(1.0);
+        let worst = Worst {
+            margin: if holds { p / family.per_test() } else { 0.0 },
+            what: what.clone(),
+            statistic: Some(count as f64 / runs as f64),
+            p_value: Some(p),
+            threshold: Some(family.per_test()),
+        };
+        self.add(holds, worst, || format!("not so: {what}"))
+    }
+
     fn add(&mut self, holds: bool, candidate: Worst, said: impl FnOnce() -> String) -> bool {
         self.tests += 1;
         if !holds {
@@ -161,6 +201,41 @@ impl Tally {
     }
 }
 
+/// How far, relatively, a probability has to lie outside [`low`, `high`] for its test by `runs` to fail with probability 0.99; on
+/// the side where that is farther. `None` where no share fails.
+fn rate_detected(runs: u64, [low, high]: [f64; 2], confidence: f64) -> Option<f64> {
+    // The counts that fail are the upper and the lower ones: the first of each by bisection.
+    let first = |fails: &dyn Fn(u64) -> bool| {
+        let (mut holds, mut wrong) = (0, runs);
+        if !fails(wrong) {
+            return None;
+        }
+        while wrong - holds > 1 {
+            let middle = holds + (wrong - holds) / 2;
+            if fails(middle) { wrong = middle } else { holds = middle }
+        }
+        Some(wrong)
+    };
+    let above = (high < 1.0).then(|| {
+        let count = first(&|count| clopper_pearson(count, runs, confidence)[0] > high)?;
+        // Fewer than `count` with probability 0.01.
+        Some(clopper_pearson(count - 1, runs, 0.98)[1] / high - 1.0)
+    });
+    let below = (low > 0.0).then(|| {
+        let misses = first(&|misses| clopper_pearson(runs - misses, runs, confidence)[1] < low)?;
+        Some(1.0 - clopper_pearson(runs - misses + 1, runs, 0.98)[0] / low)
+    });
+    match (above, below) {
+        // A side on which nothing can fail with so few runs is not spoken of, unless neither can.
+        (Some(a), Some(b)) => match (a, b) {
+            (Some(a), Some(b)) => Some(a.max(b)),
+            (one, other) => one.or(other),
+        },
+        (Some(one), None) | (None, Some(one)) => one,
+        (None, None) => None,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -179,6 +254,37 @@ mod tests {
         tally.near("not a number", f64::NAN, 2.0, 1e-3);
         let found = tally.finish();
         assert!(!found.passed && found.says.contains("2 of 3") && found.says.contains("found 2.1"), "{found:?}");
+    }
+
+    /// 1000 runs at a claimed 1 %: what is caught is checked by the binomial distribution itself.
+    #[test]
+    fn a_rate_says_what_it_detects() {
+        let family = Family { tests: 1, false_alarm: 1e-6 };
+        let failing = |count| !Tally::new().rate("share", count, 1000, [0.0, 0.01], family);
+        let first = (0..1000).find(|&count| failing(count)).unwrap();
+        let mut tally = Tally::new();
+        tally.rate("share", 12, 1000, [0.0, 0.01], family);
+        let detects = tally.finish().detects.unwrap();
+        let p = 0.01 * (1.0 + detects);
+        let caught = 1.0 - binomial_cdf(first - 1, 1000, p);
+        assert!((caught - 0.99).abs() < 1e-6, "{first} of 1000 at {p}: {caught}");
+        // Below: found 99 % of the time, by claim.
+        let mut tally = Tally::new();
+        assert!(tally.rate("share", 985, 1000, [0.985, 0.995], family));
+        assert!(tally.finish().detects.unwrap() < 0.05);
+        assert!(!Tally::new().rate("share", 900, 1000, [0.985, 0.995], family));
+        assert!(!Tally::new().rate("share", 1000, 1000, [0.5, 0.6], family));
+    }
+
+    /// P(X ≤ k) by summing.
+    fn binomial_cdf(k: u64, n: u64, p: f64) -> f64 {
+        let mut term = libm::exp(n as f64 * libm::log1p(-p));
+        let mut sum = term;
+        for i in 0..k {
+            term *= (n - i) as f64 / (i + 1) as f64 * p / (1.0 - p);
+            sum += term;
+        }
+        sum
     }
 
     #[test]

@@ -475,7 +475,7 @@ mod mutants {
         }
         bar.finish_and_clear();
         print(&planted::markdown(&rows, checks.len(), settings))?;
-        let survivors: Vec<&str> = rows.iter().filter(|r| r.least_effort.is_none()).map(|r| r.mutant.name()).collect();
+        let survivors: Vec<&str> = rows.iter().filter(|r| r.least.is_none()).map(|r| r.mutant.name()).collect();
         if survivors.is_empty() {
             return Ok(());
         }

@@ -1,4 +1,4 @@
-//! Radiance along one camera ray: the sheet's equations (1) and (2), and nothing else.
+//! Light that reaches a surface directly: the sheet's equations (1) and (2), and nothing else.
 
 use glam::{Vec2, Vec3};
 
@@ -6,24 +6,25 @@ use crate::accel::Ray;
 use crate::mutants::{Mutant, planted};
 use crate::scene::config::Estimator;
 use crate::scene::geometry::SurfacePoint;
-use crate::scene::light::{Light, LightSet, pick_light};
+use crate::scene::light::{Light, LightPoint, LightSet, pick_light};
 
-/// What a sample adds if nothing stands between surface and light.
+/// What a point of a light sends to a surface if nothing stands between them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Contribution {
-    /// k_a · L_i · (ω_i·n), divided by the light's probability where the estimator is unbiased.
-    pub radiance: Vec3,
+pub(super) struct Arrival {
+    /// Whether surface and light are in front of each other. Where they are not, the rest means nothing.
+    pub lit: bool,
+    /// A · (ω_i·n) · (−ω_i·n_l) / r²: times emission and albedo it is the light's share of eq. (1). Area sampling with
+    /// `pdf_area` = 1/A.
+    pub weight: f32,
     /// From the surface to the light's point, at t = 1; a hit at 0 < t < 1 takes the contribution away.
     pub shadow_ray: Ray,
 }
 
-/// L_i = k_e · A · (−ω_i·n_l) / r², weighted by the surface's cosine: the light's share of eq. (1) but for albedo and visibility.
+/// Works out an [`Arrival`], without branches, so that a loop over lanes becomes vector instructions.
 ///
-/// Area sampling with `pdf_area` = 1/A. `None` where the point is not in front of the light or the light not in front of the
-/// surface. Lengths enter as ratios only, so the value does not change with the scene's scale.
-#[inline]
-pub fn light_contribution(light: &Light, u: Vec2, from: &SurfacePoint) -> Option<(Vec3, Ray)> {
-    let to = light.point(u);
+/// Lengths enter as ratios only, so the weight does not change with the scene's scale.
+#[inline(always)]
+pub(super) fn arrival(to: &LightPoint, area: f32, from: &SurfacePoint) -> Arrival {
     let geometric_side =
         if (to.position - from.position).dot(from.face_normal) < 0.0 { -from.offset } else { from.offset };
     let origin = from.position + from.face_normal * geometric_side;
@@ -37,41 +38,42 @@ pub fn light_contribution(light: &Light, u: Vec2, from: &SurfacePoint) -> Option
     if planted(Mutant::LightFromBehind) {
         cos_light = cos_light.abs();
     }
-    if !(cos_surface > 0.0 && cos_light > 0.0) {
-        return None;
-    }
     let weight = match () {
-        () if planted(Mutant::CosineSquared) => cos_surface * cos_surface * cos_light * (light.area / r / r),
-        () if planted(Mutant::LightCosineForgotten) => cos_surface * (light.area / r / r),
-        () if planted(Mutant::DistanceNotSquared) => cos_surface * cos_light * (light.area / r),
-        () => cos_surface * cos_light * (light.area / r / r),
+        () if planted(Mutant::CosineSquared) => cos_surface * cos_surface * cos_light * (area / r / r),
+        () if planted(Mutant::LightCosineForgotten) => cos_surface * (area / r / r),
+        () if planted(Mutant::DistanceNotSquared) => cos_surface * cos_light * (area / r),
+        () => cos_surface * cos_light * (area / r / r),
     };
-    Some((light.emission * weight, Ray { origin, direction: way }))
+    // Written so that what is no number is not lit.
+    Arrival { lit: (cos_surface > 0.0) & (cos_light > 0.0), weight, shadow_ray: Ray { origin, direction: way } }
 }
 
-/// Chooses a light and a point on it, by `pick` and `point` in [0, 1).
+/// L_i = k_e · A · (−ω_i·n_l) / r², weighted by the surface's cosine: the light's share of eq. (1) but for albedo and
+/// visibility, and the ray that decides the latter (see [`Ray`]: a hit at 0 < t < 1 takes the contribution away).
+///
+/// Area sampling with `pdf_area` = 1/A. `None` where the point is not in front of the light or the light not in front of the
+/// surface.
 #[inline]
-pub(super) fn direct_light(
-    lights: &LightSet,
-    estimator: Estimator,
-    pick: f32,
-    point: Vec2,
-    from: &SurfacePoint,
-    albedo: Vec3,
-) -> Option<Contribution> {
-    let (light, probability) = match lights {
-        LightSet::Dark => return None,
-        LightSet::One { light, .. } => (light, 1.0),
+pub fn light_contribution(light: &Light, u: Vec2, from: &SurfacePoint) -> Option<(Vec3, Ray)> {
+    let arrival = arrival(&light.point(u), light.area, from);
+    arrival.lit.then(|| (light.emission * arrival.weight, arrival.shadow_ray))
+}
+
+/// The light that `pick` in [0, 1) chooses, and what its contribution is divided by.
+#[inline(always)]
+pub(super) fn choose(lights: &LightSet, estimator: Estimator, pick: f32) -> Option<(&Light, f32)> {
+    match lights {
+        LightSet::Dark => None,
+        LightSet::One { light, .. } => Some((light, 1.0)),
         LightSet::Many { lights, pmf, cumulative, .. } => {
             let index = pick_light(cumulative, pick);
-            match estimator {
-                Estimator::Unbiased if planted(Mutant::ProbabilityMissing) => (&lights[index], 1.0),
-                Estimator::Unbiased => (&lights[index], pmf[index]),
+            let probability = match estimator {
+                Estimator::Unbiased if planted(Mutant::ProbabilityMissing) => 1.0,
+                Estimator::Unbiased => pmf[index],
                 // The sheet's shortcut: as if the light had been certain. Offered to show its error.
-                Estimator::Sheet => (&lights[index], 1.0),
-            }
+                Estimator::Sheet => 1.0,
+            };
+            Some((&lights[index], probability))
         }
-    };
-    let (received, shadow_ray) = light_contribution(light, point, from)?;
-    Some(Contribution { radiance: albedo * received / probability, shadow_ray })
+    }
 }

@@ -2,19 +2,16 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::accel::{LANES, Packet, Ray};
+use crate::accel::{LANES, Row, Wide, column};
 use crate::film::Image;
 use crate::mutants::{Mutant, planted};
-use crate::sampling::{PixelKey, PointSource};
-use crate::scene::camera::{Aperture, PixelSample};
+use crate::sampling::PointSource;
 use crate::scene::compile::Scene;
-use crate::scene::geometry::{SurfacePoint, surface_point};
-use crate::scene::light::LightSet;
 
-use super::direct::direct_light;
+use super::lanes::{Lanes, Span};
 
 /// Side of a tile in pixels.
 const TILE: u32 = 8;
@@ -94,7 +91,7 @@ pub fn render_while<S: PointSource>(
             let (x0, y0) = ((t % columns) * TILE, (t / columns) * TILE);
             let pixels: Vec<(u32, u32)> =
                 (y0..(y0 + TILE).min(height)).flat_map(|y| (x0..(x0 + TILE).min(width)).map(move |x| (x, y))).collect();
-            let tile = render_pixels(scene, source, &pixels, lanes);
+            let tile = scene.accel.kernel().run(Tile { scene, source, pixels: &pixels, lanes });
             if !go_on(pixels.len() as u64 * u64::from(source.samples())) {
                 stopped.store(true, Ordering::Relaxed);
             }
@@ -127,9 +124,8 @@ pub fn render_while<S: PointSource>(
 /// Traces one sample alone: what [`render`] adds to pixel (x, y) for `index`.
 pub fn render_sample<S: PointSource>(scene: &Scene, source: &S, x: u32, y: u32, index: u32) -> Vec3 {
     let mut lanes = Lanes::default();
-    lanes.gather(scene, source, &[Span { pixel: 0, x, y, first: index, lane: 0, count: 1 }]);
-    lanes.trace(scene);
-    lanes.radiance[0]
+    lanes.sample(scene, source, &[Span { pixel: 0, x, y, first: index, lane: 0, count: 1 }]);
+    column(&lanes.radiance, 0)
 }
 
 struct TileResult {
@@ -137,179 +133,62 @@ struct TileResult {
     rays: u64,
 }
 
-/// Consecutive samples of one pixel, and the lanes they take.
-#[derive(Clone, Copy)]
-struct Span {
-    /// The pixel's place in its tile.
-    pixel: usize,
-    x: u32,
-    y: u32,
-    first: u32,
-    lane: usize,
-    count: usize,
+/// Some pixels to render: compiled for each vector width.
+struct Tile<'a, S> {
+    scene: &'a Scene,
+    source: &'a S,
+    pixels: &'a [(u32, u32)],
+    lanes: &'a mut Lanes,
 }
 
-/// Everything a packet of samples needs, kept between packets: nothing is allocated per sample.
-struct Lanes {
-    view: Packet,
-    shadow: Packet,
-    rays: [Ray; LANES],
-    pick: [f32; LANES],
-    light: [[f32; LANES]; 2],
-    radiance: [Vec3; LANES],
-    used: usize,
-    ray_count: u64,
-}
+impl<S: PointSource> Wide for Tile<'_, S> {
+    type Output = Result<TileResult, NonFinite>;
 
-impl Default for Lanes {
-    fn default() -> Self {
-        Self {
-            view: Packet::default(),
-            shadow: Packet::default(),
-            rays: [Ray { origin: Vec3::ZERO, direction: Vec3::X }; LANES],
-            pick: [0.0; LANES],
-            light: [[0.0; LANES]; 2],
-            radiance: [Vec3::ZERO; LANES],
-            used: 0,
-            ray_count: 0,
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let Self { scene, source, pixels, lanes } = self;
+        let samples = source.samples();
+        let mut sums = vec![[0.0f64; 3]; pixels.len()];
+        let mut spans: Vec<Span> = Vec::with_capacity(LANES);
+        lanes.ray_count = 0;
+        // Samples are numbered through the tile, pixel by pixel; each packet takes the next ones.
+        let (mut pixel, mut first) = (0, 0);
+        while pixel < pixels.len() {
+            spans.clear();
+            let mut lane = 0;
+            while lane < LANES && pixel < pixels.len() {
+                let (x, y) = pixels[pixel];
+                let count = (LANES - lane).min((samples - first) as usize);
+                spans.push(Span { pixel, x, y, first, lane, count });
+                lane += count;
+                first += count as u32;
+                if first == samples {
+                    (pixel, first) = (pixel + 1, 0);
+                }
+            }
+            lanes.sample(scene, source, &spans);
+            add(&lanes.radiance, &spans, &mut sums)?;
         }
+        let count = if planted(Mutant::MeanOverOneMore) { samples + 1 } else { samples };
+        let mean = |sum: &[f64; 3]| sum.map(|s| (s / f64::from(count)) as f32);
+        Ok(TileResult { pixels: pixels.iter().copied().zip(sums.iter().map(mean)).collect(), rays: lanes.ray_count })
     }
 }
 
-fn render_pixels<S: PointSource>(
-    scene: &Scene,
-    source: &S,
-    pixels: &[(u32, u32)],
-    lanes: &mut Lanes,
-) -> Result<TileResult, NonFinite> {
-    let samples = source.samples();
-    let mut sums = vec![[0.0f64; 3]; pixels.len()];
-    let mut spans: Vec<Span> = Vec::with_capacity(LANES);
-    lanes.ray_count = 0;
-    // Samples are numbered through the tile, pixel by pixel; each packet takes the next ones.
-    let (mut pixel, mut first) = (0, 0);
-    while pixel < pixels.len() {
-        spans.clear();
-        let mut lane = 0;
-        while lane < LANES && pixel < pixels.len() {
-            let (x, y) = pixels[pixel];
-            let count = (LANES - lane).min((samples - first) as usize);
-            spans.push(Span { pixel, x, y, first, lane, count });
-            lane += count;
-            first += count as u32;
-            if first == samples {
-                (pixel, first) = (pixel + 1, 0);
+/// Adds the samples of `spans` to their pixels' sums, in the order of the indices.
+#[inline(always)]
+fn add(radiance: &[Row; 3], spans: &[Span], sums: &mut [[f64; 3]]) -> Result<(), NonFinite> {
+    for span in spans {
+        let sum = &mut sums[span.pixel];
+        for (index, lane) in (span.first..).zip(span.lane..span.lane + span.count) {
+            let radiance = column(radiance, lane);
+            if !radiance.is_finite() {
+                return Err(NonFinite { x: span.x, y: span.y, index, radiance });
             }
-        }
-        lanes.gather(scene, source, &spans);
-        lanes.trace(scene);
-        for span in &spans {
-            let sum = &mut sums[span.pixel];
-            for (index, radiance) in (span.first..).zip(&lanes.radiance[span.lane..span.lane + span.count]) {
-                if !radiance.is_finite() {
-                    return Err(NonFinite { x: span.x, y: span.y, index, radiance: *radiance });
-                }
-                for (sum, c) in sum.iter_mut().zip(radiance.to_array()) {
-                    *sum += f64::from(c);
-                }
+            for (sum, c) in sum.iter_mut().zip(radiance.to_array()) {
+                *sum += f64::from(c);
             }
         }
     }
-    let count = if planted(Mutant::MeanOverOneMore) { samples + 1 } else { samples };
-    let mean = |sum: &[f64; 3]| sum.map(|s| (s / f64::from(count)) as f32);
-    Ok(TileResult { pixels: pixels.iter().copied().zip(sums.iter().map(mean)).collect(), rays: lanes.ray_count })
-}
-
-impl Lanes {
-    /// Reads the numbers of the spans' samples and sets up their camera rays.
-    #[inline]
-    fn gather<S: PointSource>(&mut self, scene: &Scene, source: &S, spans: &[Span]) {
-        self.view.clear();
-        self.used = spans.last().map_or(0, |s| s.lane + s.count);
-        let (mut px, mut py) = ([0.5f32; LANES], [0.5f32; LANES]);
-        let (mut lx, mut ly) = ([0.5f32; LANES], [0.5f32; LANES]);
-        for span in spans {
-            let key = PixelKey::new(span.x, span.y);
-            let lanes = span.lane..span.lane + span.count;
-            if let PixelSample::Sampled(dim) = &scene.camera.pixel {
-                source.fill_2d(key, span.first, dim, &mut px[lanes.clone()], &mut py[lanes.clone()]);
-            }
-            if let Aperture::ThinLens { lens, .. } = &scene.camera.aperture {
-                source.fill_2d(key, span.first, lens, &mut lx[lanes.clone()], &mut ly[lanes.clone()]);
-            }
-            match &scene.lights {
-                None | Some(LightSet::Dark) => {}
-                Some(LightSet::One { point, .. }) => {
-                    let [u, v] = &mut self.light;
-                    source.fill_2d(key, span.first, point, &mut u[lanes.clone()], &mut v[lanes.clone()]);
-                }
-                Some(LightSet::Many { pick, point, .. }) => {
-                    source.fill_1d(key, span.first, pick, &mut self.pick[lanes.clone()]);
-                    let [u, v] = &mut self.light;
-                    source.fill_2d(key, span.first, point, &mut u[lanes.clone()], &mut v[lanes.clone()]);
-                }
-            }
-            for lane in lanes {
-                let at = Vec2::new(span.x as f32 + px[lane], span.y as f32 + py[lane]);
-                let ray = match &scene.camera.aperture {
-                    Aperture::Pinhole => scene.camera.pinhole_ray(at),
-                    Aperture::ThinLens { radius, focal_depth, .. } => {
-                        scene.camera.lens_ray(at, Vec2::new(lx[lane], ly[lane]), *radius, *focal_depth)
-                    }
-                };
-                self.rays[lane] = ray;
-                self.view.set(lane, &ray, f32::INFINITY);
-            }
-        }
-    }
-
-    /// Traces the packet: view rays, shading, shadow rays.
-    #[inline]
-    fn trace(&mut self, scene: &Scene) {
-        scene.accel.closest(&mut self.view);
-        self.ray_count += self.used as u64;
-        self.shadow.clear();
-        let mut shadows = 0;
-        for lane in 0..self.used {
-            self.radiance[lane] = Vec3::ZERO;
-            let Some(hit) = self.view.hit(lane) else { continue };
-            let point = surface_point(&scene.faces[hit.triangle as usize], &self.rays[lane]);
-            let Some(lights) = &scene.lights else {
-                self.radiance[lane] = albedo(scene, &point);
-                continue;
-            };
-            let material = &scene.mesh.materials[point.material as usize];
-            if material.is_emitter {
-                self.radiance[lane] = material.emission;
-                continue;
-            }
-            let u = Vec2::new(self.light[0][lane], self.light[1][lane]);
-            let albedo = albedo(scene, &point);
-            if let Some(c) = direct_light(lights, scene.estimator, self.pick[lane], u, &point, albedo) {
-                self.radiance[lane] =
-                    if planted(Mutant::SampleClamped) { c.radiance.min(Vec3::ONE) } else { c.radiance };
-                let end = if planted(Mutant::ShadowRayTooLong) { 1.01 } else { 1.0 };
-                self.shadow.set(lane, &c.shadow_ray, end);
-                shadows += 1;
-            }
-        }
-        if shadows > 0 {
-            self.ray_count += shadows;
-            scene.accel.occluded(&mut self.shadow);
-            for lane in 0..self.used {
-                if self.shadow.is_occluded(lane) {
-                    self.radiance[lane] = Vec3::ZERO;
-                }
-            }
-        }
-    }
-}
-
-#[inline]
-fn albedo(scene: &Scene, point: &SurfacePoint) -> Vec3 {
-    let material = &scene.mesh.materials[point.material as usize];
-    match material.texture {
-        None => material.albedo,
-        Some(texture) => material.albedo * scene.mesh.textures[texture as usize].sample(point.uv),
-    }
+    Ok(())
 }

@@ -3,8 +3,8 @@
 //! Everything here takes an estimate with its standard error and degrees of freedom, and gives a p-value; Holm's correction
 //! over the family of a table is its caller's.
 
-use crate::stats::hypothesis::two_sided;
-use crate::stats::{Estimate, Moments, student_t_quantile};
+use crate::stats::hypothesis::{equivalence_of_estimate, two_sided};
+use crate::stats::{Estimate, Family, Moments, student_t_quantile};
 
 /// Adjusted p-values below this are told as findings.
 pub const LEVEL: f64 = 0.05;
@@ -72,7 +72,8 @@ impl Measured {
     /// Where it is small, the value is shown to be within ± `margin`. The larger of the two one-sided p-values (Schuirmann
     /// 1987, doi:10.1007/BF01068419).
     pub fn p_outside(&self, margin: f64) -> f64 {
-        self.above(margin - self.value.abs())
+        let Self { value, error, freedom } = *self;
+        equivalence_of_estimate(value, error, freedom, margin, Family::one(0.5 * LEVEL)).p_value.unwrap_or(1.0)
     }
 
     /// p-value of the hypothesis that the true value is within ± `margin`: where it is small, the value is shown to be

@@ -80,18 +80,38 @@ impl Permutation {
         debug_assert!(index < self.n);
         let mut x = index;
         loop {
-            // Only the bits below `mask` matter to what follows them, so it is enough to mask before each shift to the right.
-            let mut i = 0;
-            while i < 4 {
-                let k = self.keys[i];
-                x = x.wrapping_add(k).wrapping_mul((k >> 15) | 1) & self.mask;
-                x ^= x >> self.shift;
-                x = x.wrapping_add(k >> 7).wrapping_mul((k >> 21) | 1) & self.mask;
-                x ^= x >> 1;
-                i += 1;
-            }
+            x = self.step(x);
             if x < self.n {
                 return x;
+            }
+        }
+    }
+
+    /// The bijection of the power of two, whose cycles are walked.
+    #[inline(always)]
+    const fn step(&self, mut x: u32) -> u32 {
+        // Only the bits below `mask` matter to what follows them, so it is enough to mask before each shift to the right.
+        let mut i = 0;
+        while i < 4 {
+            let k = self.keys[i];
+            x = x.wrapping_add(k).wrapping_mul((k >> 15) | 1) & self.mask;
+            x ^= x >> self.shift;
+            x = x.wrapping_add(k >> 7).wrapping_mul((k >> 21) | 1) & self.mask;
+            x ^= x >> 1;
+            i += 1;
+        }
+        x
+    }
+
+    /// Places of several indices, all below n: as [`Self::place`], walking all of them together.
+    #[inline(always)]
+    pub fn places<const N: usize>(&self, indices: &mut [u32; N]) {
+        indices.iter_mut().for_each(|x| *x = self.step(*x));
+        // Of a power of two nothing lies beyond.
+        while indices.iter().fold(false, |beyond, &x| beyond | (x >= self.n)) {
+            for x in indices.iter_mut() {
+                let next = self.step(*x);
+                *x = if *x >= self.n { next } else { *x };
             }
         }
     }
@@ -127,6 +147,9 @@ mod tests {
                 let mut seen = vec![false; n as usize];
                 for i in 0..n {
                     let p = permute(i, n, key) as usize;
+                    let mut block = [i, n - 1 - i, 0];
+                    Permutation::new(n, key).places(&mut block);
+                    assert_eq!(block, [p as u32, permute(n - 1 - i, n, key), permute(0, n, key)]);
                     assert!(!std::mem::replace(&mut seen[p], true), "n {n}, key {key}: {p} twice");
                 }
             }

@@ -2,6 +2,7 @@
 //!
 //! A number is R_key(P(π(i), D)): point set P, index order π, dimensions D of the decision, randomisation R under a key.
 
+pub mod divisor;
 mod domain;
 pub mod hash;
 mod layout;

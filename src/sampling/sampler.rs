@@ -1,12 +1,13 @@
 //! Samplers at work: a number is a pure function of (seed, pixel, sample index, dimension).
 
+use super::divisor::Divisor;
 use super::hash::{Permutation, bits32, derive, mix64, unit_f32};
 use super::layout::{Claim, Decision, Dim1, Dim2, SampleLayout};
-use super::radical::{PRIMES, digit_count, digit_scrambled, radical_inverse, radical_inverse_f64};
+use super::radical::{HaltonAxis, PRIMES, radical_inverse_f64};
 use super::set::{SamplerSet, sheet_1d};
 use super::sobol::{SobolAxis, owen_scramble};
 use super::spec::{MAX_SAMPLES, Order, Points, Random, SamplerSpec, Scope};
-use super::strata::{factor_pair, in_stratum, in_stratum_f64};
+use super::strata::{factor_pair, in_stratum_f64, stratum_fraction};
 use crate::error::{Error, Result};
 use crate::mutants::{Mutant, planted, wrong};
 
@@ -125,7 +126,7 @@ impl Sampler {
         for (block, (x, y)) in x.chunks_mut(BLOCK).zip(y.chunks_mut(BLOCK)).enumerate() {
             let places = source.places(first + (block * BLOCK) as u32, x.len(), &keys);
             for (axis, out) in [x, y].into_iter().enumerate() {
-                source.fractions(axis, &places[..out.len()], &keys, |at, fraction| out[at] = fraction);
+                out.copy_from_slice(&source.fractions(axis, &places, &keys)[..out.len()]);
             }
         }
     }
@@ -138,19 +139,22 @@ impl Sampler {
 }
 
 impl PointSource for Sampler {
+    #[inline(always)]
     fn samples(&self) -> u32 {
         self.samples
     }
 
+    #[inline(always)]
     fn fill_1d(&self, pixel: PixelKey, first: u32, dim: &Dim1, out: &mut [f32]) {
         let source = self.decision(dim.decision());
         let keys = source.keys(pixel);
         for (block, out) in out.chunks_mut(BLOCK).enumerate() {
             let places = source.places(first + (block * BLOCK) as u32, out.len(), &keys);
-            source.fractions(0, &places[..out.len()], &keys, |at, fraction| out[at] = unit_f32(fraction));
+            put_units(out, &source.fractions(0, &places, &keys));
         }
     }
 
+    #[inline(always)]
     fn fill_2d(&self, pixel: PixelKey, first: u32, dim: &Dim2, x: &mut [f32], y: &mut [f32]) {
         assert_eq!(x.len(), y.len());
         let source = self.decision(dim.decision());
@@ -163,9 +167,19 @@ impl PointSource for Sampler {
         for (block, (x, y)) in x.chunks_mut(BLOCK).zip(y.chunks_mut(BLOCK)).enumerate() {
             let places = source.places(first + (block * BLOCK) as u32, x.len(), &keys);
             for (axis, out) in [x, y].into_iter().enumerate() {
-                source.fractions(axis, &places[..out.len()], &keys, |at, fraction| out[at] = unit_f32(fraction));
+                put_units(out, &source.fractions(axis, &places, &keys));
             }
         }
+    }
+}
+
+/// The unit-interval floats of as many fractions as `out` takes.
+#[inline(always)]
+fn put_units(out: &mut [f32], fractions: &[u32; BLOCK]) {
+    let units = fractions.map(unit_f32);
+    match <&mut [f32; BLOCK]>::try_from(&mut *out) {
+        Ok(whole) => *whole = units,
+        Err(_) => out.copy_from_slice(&units[..out.len()]),
     }
 }
 
@@ -178,7 +192,7 @@ struct DecisionSampler {
     spec: SamplerSpec,
     decision: Decision,
     /// 1-D decisions of stratified sets, and of the sheet's presets, have n strata on a line.
-    strata: (u32, u32),
+    strata: [Divisor; 2],
     samples: u32,
     axes: [Axis; 2],
     random_key: u64,
@@ -198,8 +212,9 @@ enum AxisKind {
     Uniform,
     StratifiedX,
     StratifiedY,
-    Halton { base: u32, digits: u32 },
-    HammersleyX,
+    Halton(HaltonAxis),
+    /// With the number of points.
+    HammersleyX(Divisor),
     VanDerCorput,
     Sobol(SobolAxis),
 }
@@ -210,12 +225,14 @@ struct Keys {
     shuffle: u64,
 }
 
-/// Hands `put` the number of each place and what `fraction` makes of it.
+/// What `fraction` makes of each place.
 #[inline(always)]
-fn each(places: &[u32], mut put: impl FnMut(usize, u32), fraction: impl Fn(u32) -> u32) {
-    for (at, &place) in places.iter().enumerate() {
-        put(at, fraction(place));
+fn each(places: &[u32; BLOCK], fraction: impl Fn(u32) -> u32) -> [u32; BLOCK] {
+    let mut out = [0; BLOCK];
+    for (out, &place) in out.iter_mut().zip(places) {
+        *out = fraction(place);
     }
+    out
 }
 
 const RANDOM_TAG: u64 = 1;
@@ -234,11 +251,11 @@ impl DecisionSampler {
                 (Points::Uniform | Points::Center, _) => AxisKind::Uniform,
                 (Points::Stratified, 0) => AxisKind::StratifiedX,
                 (Points::Stratified, _) => AxisKind::StratifiedY,
-                (Points::Halton, _) => {
-                    let base = PRIMES[dimension as usize];
-                    AxisKind::Halton { base, digits: digit_count(base, samples) }
+                (Points::Halton, _) => AxisKind::Halton(HaltonAxis::new(PRIMES[dimension as usize], samples)),
+                (Points::Hammersley, 0) => {
+                    let shifted = spec.random != Random::Yxor && planted(Mutant::DividedByOneLess);
+                    AxisKind::HammersleyX(Divisor::new(u64::from(if shifted { (samples - 1).max(1) } else { samples })))
                 }
-                (Points::Hammersley, 0) => AxisKind::HammersleyX,
                 (Points::Hammersley, _) => AxisKind::VanDerCorput,
                 (Points::Ld, 0) => AxisKind::VanDerCorput,
                 (Points::Ld | Points::Sobol, _) => {
@@ -257,7 +274,7 @@ impl DecisionSampler {
         let mut made = Self {
             spec,
             decision: claim.decision,
-            strata,
+            strata: [strata.0, strata.1].map(|count: u32| Divisor::new(count.into())),
             samples,
             axes: [axis(0), axis(1)],
             random_key: 0,
@@ -279,7 +296,7 @@ impl DecisionSampler {
         self.shuffle_key = derive(seed, &[SHUFFLE_TAG, if planted(Mutant::ShuffleShared) { 0 } else { decision }]);
     }
 
-    #[inline]
+    #[inline(always)]
     fn keys(&self, pixel: PixelKey) -> Keys {
         let of_pixel = match self.spec.scope {
             _ if planted(Mutant::PixelKeyDropped) => 0,
@@ -297,90 +314,85 @@ impl DecisionSampler {
     }
 
     /// π(i) for `count` ≤ [`BLOCK`] consecutive indices; what follows them is 0.
-    #[inline]
+    #[inline(always)]
     fn places(&self, first: u32, count: usize, keys: &Keys) -> [u32; BLOCK] {
         // Also in release: beyond its count Hammersley's x is 1 and strata begin anew.
         let end = u64::from(first) + count as u64;
         assert!(end <= u64::from(self.samples), "samples {first} to {end} asked of {}", self.samples);
         let mut places = [0; BLOCK];
-        let indices = (first..).zip(&mut places[..count]);
+        for (lane, place) in (0..).zip(&mut places) {
+            *place = if (lane as usize) < count { first + lane } else { 0 };
+        }
         if self.spec.order == Order::Shuffle && planted(Mutant::ShuffleWithReplacement) {
-            indices.for_each(|(index, place)| *place = bits32(keys.shuffle, index) % self.samples);
+            places[..count].iter_mut().for_each(|place| *place = bits32(keys.shuffle, *place) % self.samples);
         } else if self.spec.order == Order::Shuffle && !planted(Mutant::ShuffleForgotten) {
-            let permutation = Permutation::new(self.samples, keys.shuffle);
-            indices.for_each(|(index, place)| *place = permutation.place(index));
-        } else {
-            indices.for_each(|(index, place)| *place = index);
+            Permutation::new(self.samples, keys.shuffle).places(&mut places);
         }
         places
     }
 
-    /// R(P(i, axis)) as a 32-bit fraction: hands `put` the number of each place and its fraction.
+    /// R(P(i, axis)) as a 32-bit fraction, for every place.
     ///
     /// What kind of axis this is gets looked at once, so that each loop is straight arithmetic.
-    #[inline]
-    fn fractions(&self, axis: usize, places: &[u32], keys: &Keys, put: impl FnMut(usize, u32)) {
+    #[inline(always)]
+    fn fractions(&self, axis: usize, places: &[u32; BLOCK], keys: &Keys) -> [u32; BLOCK] {
         let key = keys.axes[axis];
-        let (columns, rows) = self.strata;
+        let [columns, rows] = self.strata;
         let row_length = if planted(Mutant::StrataTransposed) { rows } else { columns };
         let skipped = if planted(Mutant::FirstPointDropped) { 1 } else { 0 };
         let jitter = |i| if planted(Mutant::JitterForgotten) { 0 } else { bits32(key, i) };
+        let column = |i: u32| row_length.remainder(i.into()) as u32;
+        let row = |i: u32| row_length.quotient(i.into()) as u32;
         match &self.axes[axis].kind {
-            AxisKind::Uniform => each(places, put, |i| bits32(key, i)),
-            AxisKind::StratifiedX => each(places, put, |i| in_stratum(i % row_length, columns, jitter(i))),
-            AxisKind::StratifiedY => each(places, put, |i| in_stratum(i / row_length, rows, jitter(i))),
-            AxisKind::Halton { base, digits } if self.spec.random == Random::Digits => {
-                each(places, put, |i| digit_scrambled(*base, *digits, i, key));
+            AxisKind::Uniform => each(places, |i| bits32(key, i)),
+            AxisKind::StratifiedX => each(places, |i| stratum_fraction(column(i), columns, jitter(i))),
+            AxisKind::StratifiedY => each(places, |i| stratum_fraction(row(i), rows, jitter(i))),
+            AxisKind::Halton(halton) if self.spec.random == Random::Digits => halton.digit_scrambled(places, key),
+            AxisKind::Halton(halton) => self.randomised(key, halton.radical_inverses(places)),
+            AxisKind::HammersleyX(cells) if self.spec.random == Random::Yxor => {
+                each(places, |i| stratum_fraction(i, *cells, 0))
             }
-            AxisKind::Halton { base, .. } => self.randomised(key, places, put, |i| radical_inverse(*base, i)),
-            AxisKind::HammersleyX if self.spec.random == Random::Yxor => {
-                each(places, put, |i| in_stratum(i, self.samples, 0));
-            }
-            AxisKind::HammersleyX => {
-                let cells = if planted(Mutant::DividedByOneLess) { self.samples - 1 } else { self.samples };
-                self.randomised(key, places, put, |i| in_stratum(i, cells, 0));
-            }
+            AxisKind::HammersleyX(cells) => self.randomised(key, each(places, |i| stratum_fraction(i, *cells, 0))),
             AxisKind::VanDerCorput if planted(Mutant::BytesReversed) => {
-                self.randomised(key, places, put, u32::swap_bytes);
+                self.randomised(key, each(places, u32::swap_bytes))
             }
-            AxisKind::VanDerCorput => self.randomised(key, places, put, |i| (i + skipped).reverse_bits()),
-            AxisKind::Sobol(sobol) => self.randomised(key, places, put, |i| sobol.fraction(i + skipped)),
+            AxisKind::VanDerCorput => self.randomised(key, each(places, |i| (i + skipped).reverse_bits())),
+            AxisKind::Sobol(sobol) => self.randomised(key, sobol.fractions(places.map(|i| i + skipped))),
         }
     }
 
     /// As [`Self::fractions`], for a set that is randomised after its points are known.
     #[inline(always)]
-    fn randomised(&self, key: u64, places: &[u32], put: impl FnMut(usize, u32), plain: impl Fn(u32) -> u32) {
+    fn randomised(&self, key: u64, plain: [u32; BLOCK]) -> [u32; BLOCK] {
         // Keys are well mixed: their halves serve as words.
         let word = key as u32;
         match self.spec.random {
-            Random::Xor | Random::Yxor => each(places, put, |i| plain(i) ^ word),
-            Random::Shift if planted(Mutant::ShiftClamped) => each(places, put, |i| plain(i).saturating_add(word)),
-            Random::Shift => each(places, put, |i| plain(i).wrapping_add(word)),
-            Random::Owen if planted(Mutant::XorForOwen) => each(places, put, |i| plain(i) ^ word),
-            Random::Owen if planted(Mutant::OwenOfBurley) => {
-                each(places, put, |i| wrong::burley_scramble(plain(i), word));
-            }
-            Random::Owen => each(places, put, |i| owen_scramble(plain(i), word)),
-            Random::None | Random::Fresh | Random::Jitter | Random::Digits => each(places, put, plain),
+            Random::Xor | Random::Yxor => each(&plain, |x| x ^ word),
+            Random::Shift if planted(Mutant::ShiftClamped) => each(&plain, |x| x.saturating_add(word)),
+            Random::Shift => each(&plain, |x| x.wrapping_add(word)),
+            Random::Owen if planted(Mutant::XorForOwen) => each(&plain, |x| x ^ word),
+            Random::Owen if planted(Mutant::OwenOfBurley) => each(&plain, |x| wrong::burley_scramble(x, word)),
+            Random::Owen => each(&plain, |x| owen_scramble(x, word)),
+            Random::None | Random::Fresh | Random::Jitter | Random::Digits => plain,
         }
     }
 
     /// One of [`Self::fractions`].
     fn fraction(&self, axis: usize, i: u32, keys: &Keys) -> u32 {
-        let mut found = 0;
-        self.fractions(axis, &[i], keys, |_, fraction| found = fraction);
-        found
+        let mut places = [0; BLOCK];
+        places[0] = i;
+        self.fractions(axis, &places, keys)[0]
     }
 
     /// The same value correctly rounded to f64 where the 32-bit fraction is not exact.
     fn coordinate_f64(&self, axis: usize, i: u32, keys: &Keys) -> f64 {
         let key = keys.axes[axis];
+        let [columns, rows] = self.strata.map(|count| count.value() as u32);
         match (&self.axes[axis].kind, self.spec.random) {
-            (AxisKind::Halton { base, .. }, Random::None) => radical_inverse_f64(*base, i),
-            (AxisKind::HammersleyX, Random::None | Random::Yxor) => f64::from(i) / f64::from(self.samples),
-            (AxisKind::StratifiedX, _) => in_stratum_f64(i % self.strata.0, self.strata.0, bits32(key, i)),
-            (AxisKind::StratifiedY, _) => in_stratum_f64(i / self.strata.0, self.strata.1, bits32(key, i)),
+            (AxisKind::Halton(halton), Random::None) => radical_inverse_f64(halton.base(), i),
+            (AxisKind::HammersleyX(_), Random::None | Random::Yxor) => f64::from(i) / f64::from(self.samples),
+            (AxisKind::StratifiedX, _) => in_stratum_f64(i % columns, columns, bits32(key, i)),
+            (AxisKind::StratifiedY, _) => in_stratum_f64(i / columns, rows, bits32(key, i)),
             _ => f64::from(self.fraction(axis, i, keys)) / 4_294_967_296.0,
         }
     }

@@ -36,6 +36,26 @@ impl SobolAxis {
             ^ self.tables[2][((index >> 16) & 255) as usize]
     }
 
+    /// [`Self::fraction`] of several indices at once.
+    #[inline(always)]
+    pub fn fractions<const N: usize>(&self, indices: [u32; N]) -> [u32; N] {
+        let first = indices[0];
+        let run = (0..).zip(indices).fold(first & 15 == 0 && N <= 16, |run, (l, i)| run & (i == first + l));
+        let mut out = [0; N];
+        if run {
+            // An aligned run shares all but the lowest digits.
+            let shared = self.fraction(first);
+            for (out, low) in out.iter_mut().zip(&self.tables[0]) {
+                *out = shared ^ low;
+            }
+        } else {
+            for (out, index) in out.iter_mut().zip(indices) {
+                *out = self.fraction(index);
+            }
+        }
+        out
+    }
+
     /// The generator matrix, column by column, most significant digit first in each word.
     pub fn columns(&self) -> &[u32; 32] {
         &self.columns
@@ -122,6 +142,10 @@ mod tests {
             let axis = SobolAxis::new(dimension).unwrap();
             for index in (0..300).chain([65_535, 65_536, (1 << 24) - 1]) {
                 assert_eq!(axis.fraction(index), by_definition(&axis, index));
+                let run: [u32; 16] = std::array::from_fn(|l| (index & !15) + l as u32);
+                assert_eq!(axis.fractions(run), run.map(|i| by_definition(&axis, i)));
+                let others: [u32; 16] = std::array::from_fn(|l| index.saturating_sub(7 * l as u32));
+                assert_eq!(axis.fractions(others), others.map(|i| by_definition(&axis, i)));
             }
         }
     }

@@ -1,5 +1,7 @@
 //! Jittered strata in one and two dimensions.
 
+use super::divisor::Divisor;
+
 /// The factor pair a·b = n nearest to a square, a ≤ b, where it is near enough: b/a ≤ 2.
 pub fn factor_pair(n: u32) -> Option<(u32, u32)> {
     let mut a = n.isqrt();
@@ -18,9 +20,14 @@ pub fn strata_taken(asked: u32) -> u32 {
 }
 
 /// A point of stratum `cell` of `cells` equal ones, as a 32-bit fraction: ⌊(cell·2³² + jitter) / cells⌋.
-#[inline(always)]
 pub fn in_stratum(cell: u32, cells: u32, jitter: u32) -> u32 {
-    (((u64::from(cell) << 32) | u64::from(jitter)) / u64::from(cells)) as u32
+    stratum_fraction(cell, Divisor::new(cells.into()), jitter)
+}
+
+/// [`in_stratum`] with the number of strata made ready.
+#[inline(always)]
+pub(super) fn stratum_fraction(cell: u32, cells: Divisor, jitter: u32) -> u32 {
+    cells.quotient((u64::from(cell) << 32) | u64::from(jitter)) as u32
 }
 
 /// The same, correctly rounded to f64.

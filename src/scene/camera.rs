@@ -79,7 +79,7 @@ impl Camera {
     }
 
     /// Direction with unit part along the viewing direction, to the image point `at`: (0, 0) top left, `size` bottom right.
-    #[inline]
+    #[inline(always)]
     fn through(&self, at: Vec2) -> Vec3 {
         let at = if planted(Mutant::PixelOffByHalf) { at + 0.5 } else { at };
         let x = (2.0 * at.x / self.size.0 as f32 - 1.0) * self.half.x;
@@ -88,7 +88,7 @@ impl Camera {
     }
 
     /// The ray through image point `at` from the lens's centre.
-    #[inline]
+    #[inline(always)]
     pub fn pinhole_ray(&self, at: Vec2) -> Ray {
         Ray { origin: self.pos, direction: self.through(at).normalize() }
     }
@@ -97,7 +97,7 @@ impl Camera {
     ///
     /// The lens point is o = radius · disk(u); the ray goes from pos + o to pos + f·d, d having unit part along `dir`, so the
     /// focus is a plane. Written as d − o/f it stays finite for any focal depth.
-    #[inline]
+    #[inline(always)]
     pub fn lens_ray(&self, at: Vec2, u: Vec2, radius: f32, focal_depth: f32) -> Ray {
         let radius = if planted(Mutant::LensOfDiameter) { 2.0 * radius } else { radius };
         let disk = warp::square_to_disk(u) * radius;

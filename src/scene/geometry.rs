@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::accel::{Ray, Triangle};
+use crate::accel::{LANES, Ray, Row, Triangle, column, set_column};
 use crate::mutants::{Mutant, planted};
 
 use super::mesh::Mesh;
@@ -90,13 +90,12 @@ pub fn faces(mesh: &Mesh) -> Vec<Face> {
 }
 
 /// The surface where `ray` met this face.
-#[inline]
+#[inline(always)]
 pub fn surface_point(face: &Face, ray: &Ray) -> SurfacePoint {
-    let b = barycentric(&face.corners, ray);
-    let blend = |v: &[Vec3; 3]| v[0] * b.x + v[1] * b.y + v[2] * b.z;
+    let (b, position, normal) = interpolate(&face.corners, &face.normals, face.face_normal, ray);
     SurfacePoint {
-        position: blend(&face.corners),
-        normal: blend(&face.normals).try_normalize().unwrap_or(face.face_normal),
+        position,
+        normal,
         face_normal: face.face_normal,
         uv: face.uvs[0] * b.x + face.uvs[1] * b.y + face.uvs[2] * b.z,
         material: face.material,
@@ -104,8 +103,118 @@ pub fn surface_point(face: &Face, ray: &Ray) -> SurfacePoint {
     }
 }
 
+/// Barycentric weights, position and unit shading normal where `ray` crosses a triangle. Branch-free.
+#[inline(always)]
+fn interpolate(corners: &[Vec3; 3], normals: &[Vec3; 3], face_normal: Vec3, ray: &Ray) -> (Vec3, Vec3, Vec3) {
+    let b = barycentric(corners, ray);
+    let blend = |v: &[Vec3; 3]| v[0] * b.x + v[1] * b.y + v[2] * b.z;
+    let blended = blend(normals);
+    // glam's `try_normalize` without its branch.
+    let reciprocal = 1.0 / blended.length();
+    let unit = blended * reciprocal;
+    let usable = (reciprocal < f32::INFINITY) & (reciprocal > 0.0);
+    let normal = Vec3::new(
+        if usable { unit.x } else { face_normal.x },
+        if usable { unit.y } else { face_normal.y },
+        if usable { unit.z } else { face_normal.z },
+    );
+    (b, blend(corners), normal)
+}
+
+/// What is known of the surfaces that a packet's rays met, a row for each number and a column for each lane.
+#[derive(Debug, Clone)]
+#[repr(align(64))]
+pub struct SurfaceRows {
+    position: [Row; 3],
+    normal: [Row; 3],
+    face_normal: [Row; 3],
+    weights: [Row; 3],
+    offset: Row,
+    /// Index into the mesh's materials.
+    pub material: [u32; LANES],
+}
+
+impl Default for SurfaceRows {
+    fn default() -> Self {
+        let rows = [[0.0; LANES]; 3];
+        let (position, normal, face_normal, weights) = (rows, rows, rows, rows);
+        Self { position, normal, face_normal, weights, offset: [0.0; LANES], material: [0; LANES] }
+    }
+}
+
+/// The triangles under a packet, transposed.
+#[repr(align(64))]
+struct FaceRows {
+    corners: [[Row; 3]; 3],
+    normals: [[Row; 3]; 3],
+}
+
+impl SurfaceRows {
+    /// The surfaces where the rays met these faces, as [`surface_point`] has them; every index must be a face's.
+    #[inline(always)]
+    pub fn fill(&mut self, faces: &[Face], triangles: &[u32; LANES], origin: &[Row; 3], direction: &[Row; 3]) {
+        let first = &faces[triangles[0] as usize];
+        if triangles.iter().fold(true, |same, &t| same & (t == triangles[0])) {
+            // The rays of one pixel often meet one triangle, which then is a constant.
+            self.material = [first.material; LANES];
+            self.offset = [first.offset; LANES];
+            for lane in 0..LANES {
+                let ray = Ray { origin: column(origin, lane), direction: column(direction, lane) };
+                self.put(lane, &first.corners, &first.normals, first.face_normal, &ray);
+            }
+            return;
+        }
+        let mut rows = FaceRows { corners: [[[0.0; LANES]; 3]; 3], normals: [[[0.0; LANES]; 3]; 3] };
+        for (lane, &triangle) in triangles.iter().enumerate() {
+            let face = &faces[triangle as usize];
+            for corner in 0..3 {
+                set_column(&mut rows.corners[corner], lane, face.corners[corner]);
+                set_column(&mut rows.normals[corner], lane, face.normals[corner]);
+            }
+            set_column(&mut self.face_normal, lane, face.face_normal);
+            self.offset[lane] = face.offset;
+            self.material[lane] = face.material;
+        }
+        for lane in 0..LANES {
+            let ray = Ray { origin: column(origin, lane), direction: column(direction, lane) };
+            let corners = [0, 1, 2].map(|c| column(&rows.corners[c], lane));
+            let normals = [0, 1, 2].map(|c| column(&rows.normals[c], lane));
+            self.put(lane, &corners, &normals, column(&self.face_normal, lane), &ray);
+        }
+    }
+
+    #[inline(always)]
+    fn put(&mut self, lane: usize, corners: &[Vec3; 3], normals: &[Vec3; 3], face_normal: Vec3, ray: &Ray) {
+        let (weights, position, normal) = interpolate(corners, normals, face_normal, ray);
+        set_column(&mut self.weights, lane, weights);
+        set_column(&mut self.position, lane, position);
+        set_column(&mut self.normal, lane, normal);
+        set_column(&mut self.face_normal, lane, face_normal);
+    }
+
+    /// One lane's surface; its texture coordinates are [`Self::uv`]'s.
+    #[inline(always)]
+    pub fn at(&self, lane: usize) -> SurfacePoint {
+        SurfacePoint {
+            position: column(&self.position, lane),
+            normal: column(&self.normal, lane),
+            face_normal: column(&self.face_normal, lane),
+            uv: Vec2::ZERO,
+            material: self.material[lane],
+            offset: self.offset[lane],
+        }
+    }
+
+    /// One lane's texture coordinates; `face` is the one that its ray met.
+    #[inline(always)]
+    pub fn uv(&self, face: &Face, lane: usize) -> Vec2 {
+        let b = column(&self.weights, lane);
+        face.uvs[0] * b.x + face.uvs[1] * b.y + face.uvs[2] * b.z
+    }
+}
+
 /// Barycentric weights of the point where `ray` crosses the triangle's plane, from the same edge functions that decide hits.
-#[inline]
+#[inline(always)]
 fn barycentric(corners: &[Vec3; 3], ray: &Ray) -> Vec3 {
     let d = ray.direction;
     let [a, b, c] = corners.map(|p| p - ray.origin);

@@ -38,16 +38,28 @@ pub struct Light {
 
 #[derive(Debug, Clone)]
 enum Shape {
-    Parallelogram {
-        corner: Vec3,
-        e1: Vec3,
-        e2: Vec3,
-        normal: Vec3,
-    },
+    Parallelogram(Parallelogram),
     /// Triangles with the cumulative share of the area up to and including each.
     Mesh {
         triangles: Vec<MeshTriangle>,
     },
+}
+
+/// A parallelogram that emits on one side.
+#[derive(Debug, Clone, Copy)]
+pub struct Parallelogram {
+    corner: Vec3,
+    e1: Vec3,
+    e2: Vec3,
+    normal: Vec3,
+}
+
+impl Parallelogram {
+    /// The point that `u` in [0, 1)² names; uniform by area.
+    #[inline(always)]
+    pub fn point(&self, u: Vec2) -> LightPoint {
+        LightPoint { position: warp::square_to_parallelogram(u, self.corner, self.e1, self.e2), normal: self.normal }
+    }
 }
 
 #[derive(Debug, Clone)]
@@ -88,20 +100,26 @@ impl Light {
         Some(Self { name, emission, area: counted as f32, power, shape })
     }
 
+    /// The parallelogram that this light is, if it was recognised as one.
+    pub fn parallelogram(&self) -> Option<&Parallelogram> {
+        match &self.shape {
+            Shape::Parallelogram(parallelogram) => Some(parallelogram),
+            Shape::Mesh { .. } => None,
+        }
+    }
+
     /// Whether two triangles were recognised as one parallelogram.
     pub fn is_parallelogram(&self) -> bool {
-        matches!(self.shape, Shape::Parallelogram { .. })
+        self.parallelogram().is_some()
     }
 
     /// The point that `u` in [0, 1)² names; uniform by area.
     ///
     /// A mesh takes its triangle from `u.x` and stretches what is left of it over that triangle, so one 2-D decision serves.
-    #[inline]
+    #[inline(always)]
     pub fn point(&self, u: Vec2) -> LightPoint {
         match &self.shape {
-            Shape::Parallelogram { corner, e1, e2, normal } => {
-                LightPoint { position: warp::square_to_parallelogram(u, *corner, *e1, *e2), normal: *normal }
-            }
+            Shape::Parallelogram(parallelogram) => parallelogram.point(u),
             Shape::Mesh { triangles } => {
                 let index = triangles.partition_point(|t| t.share_after <= u.x).min(triangles.len() - 1);
                 let t = &triangles[index];
@@ -128,7 +146,7 @@ fn parallelogram(triangles: &[[Vec3; 3]]) -> Option<Shape> {
         return None;
     }
     let offset = offset_length(first).max(offset_length(second));
-    Some(Shape::Parallelogram { corner: p + normal * offset, e1: s1 - p, e2: s2 - p, normal })
+    Some(Shape::Parallelogram(Parallelogram { corner: p + normal * offset, e1: s1 - p, e2: s2 - p, normal }))
 }
 
 /// The lights of a scene, and what choosing among them takes.

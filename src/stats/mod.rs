@@ -69,7 +69,7 @@ pub use error_spectrum::ErrorSpectrum;
 pub use fit::{IntervalKind, LACK_OF_FIT_LEVEL, LEAST_RESIDUAL, LineFit, SlopeFit, loglog_slope, slope_with_interval};
 pub use hypothesis::{
     Claim, Family, Outcome, Verdict, binomial_test, chi2_test, equivalence_test, fisher_test, ks_test, t_test,
-    welch_test, z_test,
+    t_test_of_squares, welch_test, z_test,
 };
 pub use image_error::Ensemble;
 pub use moments::{Estimate, Moments, jackknife, student_t_quantile, sum, t_interval, variance_interval};

@@ -11,7 +11,7 @@ use crate::check::room::Exact;
 use crate::render::light_contribution;
 use crate::scene::geometry::SurfacePoint;
 use crate::scene::light::Light;
-use crate::stats::t_test;
+use crate::stats::hypothesis::t_test_of_squares;
 
 /// The checks of this file.
 pub fn checks() -> Vec<Check> {
@@ -187,7 +187,7 @@ fn variance_of(context: &Context, settings: &[Setting]) -> Finding {
         let samples = setting.received(context.replicates(2 * SAMPLES, 1_000), context.seed_of(part as u64, 1));
         let (mean, variance) = (setting.exact().value, setting.variance());
         let squares: Vec<f64> = samples.iter().map(|s| (s - mean).powi(2)).collect();
-        tally.verdict(&setting.name, &t_test(&squares, variance, family), variance);
+        tally.verdict(&setting.name, &t_test_of_squares(&squares, variance, family), variance);
     }
     tally.finish()
 }
@@ -224,7 +224,7 @@ fn mean_alone_is_blind(context: &Context) -> Finding {
     let samples: Vec<f64> = uniform_points(context.seed, context.replicates(SAMPLES, 1_000)).map(wrong).collect();
     let (exact, variance) = (setting.exact(), setting.variance());
     let squares: Vec<f64> = samples.iter().map(|s| (s - exact.value).powi(2)).collect();
-    let (mean, spread) = (exact.test(&samples, family), t_test(&squares, variance, family));
+    let (mean, spread) = (exact.test(&samples, family), t_test_of_squares(&squares, variance, family));
     let found = squares.iter().sum::<f64>() / squares.len() as f64;
     let mut tally = Tally::new();
     tally.verdict("the mean is right", &mean, exact.value);

@@ -11,7 +11,7 @@ use crate::check::room::{Exact, Room, ceiling, grey, looking_at, parallelogram, 
 use crate::scene::compile::{Scene, Stage};
 use crate::scene::config::CameraConfig;
 use crate::scene::light::LightSet;
-use crate::stats::t_test;
+use crate::stats::hypothesis::t_test_of_squares;
 
 /// The checks of this file.
 pub fn checks() -> Vec<Check> {
@@ -208,7 +208,7 @@ fn variance_of(context: &Context, patches: &[Patch]) -> Finding {
         let samples = patch.samples(side(context), context.seed_of(part as u64, 1));
         let Moments { mean, variance } = patch.moments();
         let squares: Vec<f64> = samples.iter().map(|s| (s - mean.value).powi(2)).collect();
-        tally.verdict(patch.name, &t_test(&squares, variance, family), variance);
+        tally.verdict(patch.name, &t_test_of_squares(&squares, variance, family), variance);
     }
     tally.finish()
 }

@@ -6,7 +6,7 @@ use crate::sampling::{
 use crate::stats::discrepancy::{Points, star_2d, t_value};
 use crate::stats::{Family, Verdict, t_test};
 
-use super::super::{Context, Tally};
+use super::super::Tally;
 
 /// A point of the plane.
 pub type Point = [f64; 2];
@@ -127,13 +127,6 @@ pub fn caught(tally: &mut Tally, what: &str, replicates: &[f64], exact: f64, fam
     let verdict = t_test(replicates, exact, family);
     tally.fact(format!("{what} is caught: {verdict}"), !verdict.holds());
     verdict
-}
-
-/// A family for `tests` tests of a variance by mean squares. Squares of normal numbers have skewness 2.8; the mean of 5000 or more
-/// of them leans to the lower side so much that a test's false alarms are up to 6 times the nominal ones at the levels used here
-/// (e^(z³/6 · 2.8/√5000) at z = 6.5), so each counts as 8.
-pub fn family_of_squares(context: &Context, tests: u32) -> Family {
-    context.family(8 * tests)
 }
 
 /// Mean of replicates, for words.

@@ -3,7 +3,8 @@
 use crate::stats::t_test;
 
 use super::super::{Check, Context, Finding, Kind, Tally};
-use super::common::{Point, Tickets, all, average, family_of_squares, mean, net_t, pixel, points, span, star};
+use super::common::{Point, Tickets, all, average, mean, net_t, pixel, points, span, star};
+use crate::stats::hypothesis::t_test_of_squares;
 
 /// The checks of this file.
 pub fn checks() -> Vec<Check> {
@@ -55,7 +56,7 @@ fn promised(n: u32) -> f64 {
 fn net_at_48(context: &Context) -> Finding {
     let mut tally = Tally::new();
     let tickets = Tickets::new();
-    let family = family_of_squares(context, 4);
+    let family = context.family(4);
     let mut said = Vec::new();
     for (n, usual) in [(48u32, 40_000), (1000, 8000)] {
         let replicates = context.replicates(usual, 5000);
@@ -70,7 +71,7 @@ fn net_at_48(context: &Context) -> Finding {
         let net = n.next_power_of_two() / 2;
         tally.verdict(
             format!("{net} points: variance"),
-            &t_test(&squares(net), owen_variance(net), family),
+            &t_test_of_squares(&squares(net), owen_variance(net), family),
             owen_variance(net),
         );
         let odd: Vec<f64> = odd.iter().map(|e| e * e).collect();
@@ -103,7 +104,7 @@ fn without_point_0(context: &Context) -> Finding {
         );
     }
     let tickets = Tickets::new();
-    let family = family_of_squares(context, 2);
+    let family = context.family(2);
     let mut ratios = Vec::new();
     for (n, usual) in [(64u32, 20_000), (1024, 5000)] {
         let sampler = tickets.sampler("ld:step:owen", 2 * n, context.seed_of(u64::from(n), 0));
@@ -119,7 +120,7 @@ fn without_point_0(context: &Context) -> Finding {
             without.push(square(&points[1..]));
         }
         let exact = owen_variance(n);
-        tally.verdict(format!("n = {n}, with point 0: variance"), &t_test(&with, exact, family), exact);
+        tally.verdict(format!("n = {n}, with point 0: variance"), &t_test_of_squares(&with, exact, family), exact);
         above(
             &mut tally,
             &format!("n = {n}, without point 0: variance over 5 times that with it"),

@@ -14,6 +14,7 @@ use super::reading::{HALF_PLACE, Reader, Tickets};
 use super::variance::{cautious, laws};
 use crate::check::{Check, Context, Finding, Kind, Tally};
 use crate::sampling::{Decision, PointSource, Points, Preset, Random, SamplerSpec};
+use crate::stats::hypothesis::t_test_of_squares;
 use crate::stats::{Family, Verdict, t_test};
 
 /// The checks of couplings.
@@ -230,7 +231,7 @@ fn ld_stalls(context: &Context) -> Finding {
         let squares: Vec<f64> = errors.iter().map(|e| e * e).collect();
         let variance = 2.0 * (1.0 / 60.0 + libm::exp2(-4.0 * f64::from(m)) / 45.0);
         tally.verdict(format!("n = {}, mean", 1 << m), &t_test(&errors, 0.0, family), 1.0 / 3.0);
-        tally.verdict(format!("n = {}, variance", 1 << m), &t_test(&squares, variance, family), variance);
+        tally.verdict(format!("n = {}, variance", 1 << m), &t_test_of_squares(&squares, variance, family), variance);
         let spread = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
         said.push(format!("{spread:.3} at n = {}", 1 << m));
     }

@@ -10,7 +10,7 @@
 
 use rayon::prelude::*;
 
-use super::equivalence::{BAND, LEVEL, RatioFound, ratio_within, replicates_for};
+use super::equivalence::{LEVEL, MARGIN, RatioFound, ratio_within, replicates_for};
 use super::laws::{AxisLaw, owen_diagonal, set_errors, shared_digits};
 use super::reading::{PIXEL, Tickets, numbered_specs};
 use crate::check::{Check, Context, Finding, Kind, Tally};
@@ -171,9 +171,10 @@ fn owen_exact(m: u32) -> [f64; 4] {
     [1.0 / (12.0 * cube), 7.0 * (4.0 + 3.0 * f64::from(m)) / (576.0 * cube), p * (1.0 - p) / (n * n), owen_diagonal(m)]
 }
 
-/// Ratios of a scramble of the pair, one found for each integrand.
+/// Ratios of a scramble of the pair, one found for each integrand: of variances to `scale` times Owen's.
 pub fn pair_ratios(
     m: u32,
+    scale: f64,
     replicates: u32,
     seed: impl Fn(u64) -> u64 + Sync,
     scramble: impl Fn(u32, u32) -> u32 + Sync,
@@ -187,7 +188,7 @@ pub fn pair_ratios(
             ratios(&points, [bits64(seed, 1) as u32, bits64(seed, 2) as u32], exact, &scramble)
         })
         .collect();
-    std::array::from_fn(|k| ratio_within(all.iter().map(|ratios| ratios[k])))
+    std::array::from_fn(|k| ratio_within(all.iter().map(|ratios| ratios[k] / scale)))
 }
 
 /// The step of 1024 points is 0 or 1 with probability 0.95: squares of its errors spread 17 times their mean square, and
@@ -204,15 +205,20 @@ fn owen_ratios(context: &Context) -> Finding {
     let mut said = Vec::new();
     let mut missed = Vec::new();
     for m in [6, 8, 10, 12] {
-        let found = pair_ratios(m, replicates, |r| context.seed_of(u64::from(m), r), owen_scramble);
+        let found = pair_ratios(m, 1.0, replicates, |r| context.seed_of(u64::from(m), r), owen_scramble);
         for (k, found) in found.iter().enumerate().filter(|&(k, _)| !is_lopsided(m, k)) {
-            let [low, high] = found.interval;
-            let what = format!("{}, n = {}: ratio {:.4} in [{low:.4}, {high:.4}]", NAMES[k], 1 << m, found.ratio);
-            tally.fact(what, found.within(BAND));
+            let what = format!(
+                "{}, n = {}: ratio {:.4}, p = {:.0e} of outside",
+                NAMES[k],
+                1 << m,
+                found.ratio,
+                found.p_outside
+            );
+            tally.fact_that_detects(what, found.within(), MARGIN);
             said.push(found.ratio);
         }
-        let burley = pair_ratios(m, 4000, |r| context.seed_of(100 + u64::from(m), r), burley_2020);
-        tally.fact(format!("Burley 2020, x, n = {}: ratio {:.3}", 1 << m, burley[0].ratio), burley[0].outside(BAND));
+        let burley = pair_ratios(m, 1.0, 4000, |r| context.seed_of(100 + u64::from(m), r), burley_2020);
+        tally.fact(format!("Burley 2020, x, n = {}: ratio {:.3}", 1 << m, burley[0].ratio), burley[0].outside());
         missed.push(format!("{:.2}", burley[0].ratio));
     }
     let (low, high) = said.iter().fold((f64::MAX, 0.0f64), |(l, h), &r| (l.min(r), h.max(r)));
@@ -243,11 +249,11 @@ fn xor_is_a_shift(context: &Context) -> Finding {
     let mut said = Vec::new();
     for m in [6, 8] {
         // The exact variance of the shift is n times Owen's; squares of a uniform error have the relative variance 4/5.
-        let found = pair_ratios(m, replicates, |r| context.seed_of(u64::from(m), r), |f, key| f ^ key)[0];
         let n = f64::from(1u32 << m);
-        let [low, high] = found.interval.map(|v| v / n);
-        tally.fact(format!("Var(x)·12n³ = {:.2} for n = {n}", found.ratio), BAND[0] < low && high < BAND[1]);
-        said.push(format!("{:.2} for n = {n}", found.ratio));
+        let found = pair_ratios(m, n, replicates, |r| context.seed_of(u64::from(m), r), |f, key| f ^ key)[0];
+        let what = format!("Var(x)·12n³ = {:.2} for n = {n}", n * found.ratio);
+        tally.fact_that_detects(what, found.within(), MARGIN);
+        said.push(format!("{:.2} for n = {n}", n * found.ratio));
     }
     tally.saying(format!("Var(x)·12n³ = {}, within 5 % of n over {replicates} keys", said.join(" and ")))
 }
@@ -360,11 +366,11 @@ fn digit_ratios(context: &Context) -> Finding {
     for n in [27, 64, 100] {
         let found = halton_ratios(n, replicates, |r| context.seed_of(u64::from(n), r), digit_scrambled);
         for (name, found) in ["x", "y", "xy"].iter().zip(&found) {
-            tally.fact(format!("{name}, n = {n}: ratio {:.4}", found.ratio), found.within(BAND));
+            tally.fact_that_detects(format!("{name}, n = {n}: ratio {:.4}", found.ratio), found.within(), MARGIN);
             (low, high) = (low.min(found.ratio), high.max(found.ratio));
         }
         let wrong = halton_ratios(n, 2000, |r| context.seed_of(1000 + u64::from(n), r), one_permutation_a_place);
-        tally.fact(format!("one permutation a place, x, n = {n}: ratio {:.2}", wrong[0].ratio), wrong[0].outside(BAND));
+        tally.fact(format!("one permutation a place, x, n = {n}: ratio {:.2}", wrong[0].ratio), wrong[0].outside());
         missed.push(format!("{:.1}", wrong[0].ratio));
     }
     tally.saying(format!(

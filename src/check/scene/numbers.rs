@@ -8,7 +8,7 @@ use std::f64::consts::{PI, SQRT_2};
 
 use crate::sampling::hash::derive;
 use crate::sampling::{Decision, Dim1, Dim2, PixelKey, PointSource, SampleLayout, Sampler, SamplerSet};
-use crate::stats::hypothesis::{sidak, two_sided};
+use crate::stats::hypothesis::{Verdict, sidak, two_sided};
 use crate::stats::{Family, Moments, t_test};
 
 /// Most samples of a pixel that are looked at, the first ones.
@@ -32,6 +32,8 @@ pub struct Pair {
     pub correlation: f64,
     /// The largest n E q²: 1 for independent numbers, n for equal ones.
     pub spread: f64,
+    /// The smallest p-value of its means and spreads, times the number of all pairs' tests (Bonferroni).
+    pub p: f64,
     /// Whether a mean or a spread is further out than independent numbers would be, at the family's level.
     pub is_coupled: bool,
 }
@@ -71,12 +73,13 @@ pub fn pairs(set: SamplerSet, layout: &SampleLayout, spp: u32, seed: u64, replic
         }
     }
     // A mean and a spread of each function of each pair.
-    let each = sidak(level, (4 * together.len()).max(1) as u64);
+    let tests = (4 * together.len()).max(1);
+    let each = sidak(level, tests as u64);
     let mut pairs: Vec<Pair> = Vec::new();
     for ([a, b], list) in together {
         let decisions = [owners[a], owners[b]];
         let place = pairs.iter().position(|p| p.decisions == decisions).unwrap_or_else(|| {
-            pairs.push(Pair { decisions, correlation: 0.0, spread: 0.0, is_coupled: false });
+            pairs.push(Pair { decisions, correlation: 0.0, spread: 0.0, p: 1.0, is_coupled: false });
             pairs.len() - 1
         });
         for function in 0..2 {
@@ -84,6 +87,9 @@ pub fn pairs(set: SamplerSet, layout: &SampleLayout, spp: u32, seed: u64, replic
             let pearson = list.first().map_or(0.0, |q| q[function][1]);
             pairs[place].take(&values, pearson, n, each);
         }
+    }
+    for pair in &mut pairs {
+        pair.p = (pair.p * tests as f64).min(1.0);
     }
     pairs
 }
@@ -100,15 +106,23 @@ impl Pair {
         }
         self.spread = self.spread.max(spread);
         let family = Family { tests: 1, false_alarm: level };
-        let rises = |bound: f64| spread > bound && !t_test(&squares, bound, family).holds();
-        self.is_coupled |= if moments.variance().unwrap_or(0.0) == 0.0 {
+        let p = if moments.variance().unwrap_or(0.0) == 0.0 {
             // One set for all seeds: as far out as independent normal numbers are once in 1/level times.
             let df = f64::from(n) - 2.0;
             let t = pearson * (df / (1.0 - pearson * pearson).max(f64::MIN_POSITIVE)).sqrt();
-            n > 2 && two_sided(t, df) < level
+            if n > 2 { two_sided(t, df) } else { 1.0 }
         } else {
-            !t_test(values, 0.0, family).holds() || (n > 1 && rises(f64::from(n) / f64::from(n - 1)))
+            let bound = f64::from(n) / f64::from(n.max(2) - 1);
+            let rises = n > 1 && spread > bound;
+            let of = |verdict: Verdict| match verdict.holds() {
+                true => verdict.p_value.unwrap_or(1.0),
+                false => verdict.p_value.unwrap_or(0.0),
+            };
+            let spread = if rises { of(t_test(&squares, bound, family)) } else { 1.0 };
+            of(t_test(values, 0.0, family)).min(spread)
         };
+        self.p = self.p.min(p);
+        self.is_coupled |= p < level;
     }
 }
 

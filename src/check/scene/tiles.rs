@@ -1,8 +1,9 @@
 //! Means over tiles of replicate images, and tests of whether they agree.
 //!
 //! Single pixels of an edge are rarely anything but 0 or 1, and tests on them lie a hundred times more often than they
-//! say. A tile's mean over tens of pixels is tested instead. A mean of few rare hits is no better: where not nearly every
-//! replicate differs from the rest, tiles are pooled, and a pool in which still too little varies is left to the whole image.
+//! say. A tile's mean over tens of pixels is tested instead. A mean of few rare hits is no better: a set that met too few of
+//! them is too low *and* has too small a spread, and no statistic of its own tells. What rare hits may hide is bounded
+//! instead: see [`Rare`].
 
 use crate::film::Image;
 use crate::stats::hypothesis::{holm, sidak, two_sided};
@@ -11,20 +12,43 @@ use crate::stats::{Moments, student_t_quantile};
 /// Most tiles across and down.
 pub const GRID: [u32; 2] = [8, 6];
 
-/// The share of a place's replicates that have to differ from its most frequent value. Below it hits are so rare (2.3 a
-/// replicate) that their number is too skewed for Student's t.
-pub const LEAST_VARIED: f64 = 0.9;
-
 /// How places are compared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rules {
     /// Differences up to this are no differences: what rounding may do.
     pub allowance: f64,
-    /// Where replicates that all agree may still have missed something rare: what it may have added to the mean. 0 where
-    /// they agree because nothing is random.
-    pub unseen: f64,
+    /// What rare events may hide.
+    pub rare: Rare,
     /// False-alarm rate of all places together.
     pub level: f64,
+}
+
+/// How bright a single sample may be, and how many there are.
+///
+/// Of N samples some k meet something rare that adds up to B each. k is Poisson's, and the spread that a t test sees comes from the k
+/// that were met: where too few were, mean and spread are too low together. With probability 1 − δ, k falls short of its
+/// expectation by at most √(2 ln(2/δ)) √k + ln(2/δ) (tested below against Poisson's own tails). The first term is what a
+/// t test allows for; B ln(2/δ)/N is what the rare and bright may hide from it, and is taken off every difference. With k = 0 it
+/// is the rule of three. (A bound for any distribution has 7/3 as its factor: Maurer & Pontil 2009, arXiv:0907.3740, theorem 4.)
+/// Samples of a net are not independent, but the numbers of rare hits in them vary no more.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rare {
+    /// B: the range of a single sample's value, in the unit of the means.
+    pub range: f64,
+    /// Samples behind each pixel's mean over all replicates, of what is tested and of what it is compared with; infinite where
+    /// nothing is random.
+    pub samples: [f64; 2],
+}
+
+impl Rare {
+    /// Nothing rare happens: replicates are as good as normal.
+    pub const NOTHING: Self = Self { range: 0.0, samples: [f64::INFINITY; 2] };
+
+    /// The second term of the bound, of both sides together, for a mean over `pixels` pixels.
+    fn hidden(&self, pixels: f64, delta: f64) -> f64 {
+        let term = self.range * libm::log(2.0 / delta);
+        self.samples.iter().map(|n| term / (n * pixels)).sum()
+    }
 }
 
 /// An image cut into at most [`GRID`] tiles.
@@ -62,6 +86,17 @@ impl Tiling {
         sums.into_iter().map(|(sum, count)| sum / f64::from(count.max(1))).collect()
     }
 
+    /// How many pixels a place in [`Self::means`] has.
+    pub fn pixels(&self, place: usize) -> f64 {
+        let [columns, rows] = self.shape();
+        let place = place as u32;
+        let extent = |k: usize, at: u32| f64::from((self.size[k] - at * self.tile[k]).min(self.tile[k]));
+        if place == columns * rows {
+            return f64::from(self.size[0]) * f64::from(self.size[1]);
+        }
+        extent(0, place % columns) * extent(1, place / columns)
+    }
+
     /// The name of a place in [`Self::means`].
     pub fn name(&self, place: usize) -> String {
         let [columns, rows] = self.shape();
@@ -93,17 +128,17 @@ pub enum Truth<'a> {
 /// One place compared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Compared {
-    /// Its name, or what was pooled.
+    /// Its name.
     pub name: String,
     /// Mean of the replicates.
     pub mean: f64,
     /// Mean of what they are compared with.
     pub expected: f64,
-    /// The statistic; `None` where nothing varies, or too little to be tested.
+    /// The statistic; `None` where nothing varies.
     pub t: Option<f64>,
-    /// Two-sided p-value, not corrected; 0 or 1 where nothing varies, 1 where too little does.
+    /// Two-sided p-value, not corrected; 0 or 1 where nothing varies.
     pub p: f64,
-    /// The smallest difference that the family's test would catch with probability 0.99; 0 where there is no statistic.
+    /// The smallest difference that the family's test would catch with probability 0.99.
     pub detects: f64,
 }
 
@@ -132,83 +167,40 @@ impl Comparison {
 }
 
 /// Are the expectations of replicates those of `truth`, place by place? Welch's test (Student's against known numbers) on
-/// replicate means, corrected by Holm.
-///
-/// Places that do not vary enough ([`LEAST_VARIED`]) are pooled.
+/// replicate means, less what [`Rare`] events may hide, corrected by Holm.
 pub fn compare(tiling: &Tiling, found: &Series, truth: &Truth<'_>, rules: Rules) -> Comparison {
-    let whole = found.len() - 1;
-    let (mut alone, mut quiet) = (Vec::new(), Vec::new());
-    for place in 0..whole {
-        let calm = match truth {
-            Truth::Replicates(truth) => is_testable(&found[place]) && is_testable(&truth[place]),
-            Truth::Exact(_) => is_testable(&found[place]),
-        };
-        if calm { alone.push(vec![place]) } else { quiet.push(place) }
-    }
-    if !quiet.is_empty() {
-        alone.push(quiet);
-    }
-    alone.push(vec![whole]);
-    let rules = Rules { level: sidak(rules.level, alone.len() as u64), ..rules };
-    let places: Vec<Compared> = alone
-        .iter()
-        .map(|members| {
-            let name = match members.as_slice() {
-                [one] => tiling.name(*one),
-                many => format!("{} tiles pooled", many.len()),
-            };
-            one_place(name, members, found, truth, rules)
-        })
-        .collect();
+    let level = sidak(rules.level, found.len() as u64);
+    let places: Vec<Compared> =
+        (0..found.len()).map(|place| one_place(tiling, place, found, truth, Rules { level, ..rules })).collect();
     let p: Vec<f64> = places.iter().map(|place| place.p).collect();
     let adjusted = holm(&p).expect("p-values of our own");
-    let worst = (0..p.len()).min_by(|&a, &b| p[a].total_cmp(&p[b])).expect("the whole image is a place");
+    // Of equal p-values (1, mostly) the one that came nearest to being caught.
+    let near = |place: &Compared| (place.mean - place.expected).abs() / place.detects.max(f64::MIN_POSITIVE);
+    let order = |&a: &usize, &b: &usize| p[a].total_cmp(&p[b]).then(near(&places[b]).total_cmp(&near(&places[a])));
+    let worst = (0..p.len()).min_by(order).expect("the whole image is a place");
     Comparison { places, p: adjusted[worst], worst }
 }
 
-/// Whether nearly all replicates differ, or none does: then they are a number.
-fn is_testable(series: &[f64]) -> bool {
-    let varied = varied(series);
-    varied == 0 || varied as f64 >= LEAST_VARIED * series.len() as f64
-}
-
-/// How many values differ from the most frequent one.
-fn varied(series: &[f64]) -> usize {
-    let mut sorted = series.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let longest = sorted.chunk_by(|a, b| a == b).map(<[f64]>::len).max().unwrap_or(0);
-    series.len() - longest
-}
-
-fn one_place(name: String, members: &[usize], found: &Series, truth: &Truth<'_>, rules: Rules) -> Compared {
-    let pooled = |series: &Series| -> Vec<f64> {
-        let count = members.len() as f64;
-        (0..series[members[0]].len()).map(|r| members.iter().map(|&m| series[m][r]).sum::<f64>() / count).collect()
-    };
-    let ours = pooled(found);
-    let mut testable = is_testable(&ours);
-    let ours: Moments = ours.into_iter().collect();
+/// `rules.level` is that of this place alone.
+fn one_place(tiling: &Tiling, place: usize, found: &Series, truth: &Truth<'_>, rules: Rules) -> Compared {
+    let name = tiling.name(place);
+    let ours: Moments = found[place].iter().copied().collect();
     let (expected, theirs) = match truth {
         Truth::Replicates(truth) => {
-            let theirs = pooled(truth);
-            testable &= is_testable(&theirs);
-            let moments: Moments = theirs.into_iter().collect();
+            let moments: Moments = truth[place].iter().copied().collect();
             (moments.mean().unwrap_or(0.0), Some(moments))
         }
-        Truth::Exact(values) => (members.iter().map(|&m| values[m]).sum::<f64>() / members.len() as f64, None),
+        Truth::Exact(values) => (values[place], None),
     };
     let mean = ours.mean().unwrap_or(0.0);
     let errors =
         [Some(ours), theirs].map(|m| m.map_or((0.0, 1.0), |m| (m.standard_error().unwrap_or(0.0), m.n() as f64)));
     let error = libm::hypot(errors[0].0, errors[1].0);
     let difference = mean - expected;
-    let slack = rules.allowance + if errors[0].0 == 0.0 { rules.unseen } else { 0.0 };
+    let slack = rules.allowance + rules.rare.hidden(tiling.pixels(place), rules.level);
     let left = (difference.abs() - slack).max(0.0);
-    if !testable {
-        return Compared { name, mean, expected, t: None, p: 1.0, detects: 0.0 };
-    }
     if error == 0.0 {
-        return Compared { name, mean, expected, t: None, p: if left == 0.0 { 1.0 } else { 0.0 }, detects: 0.0 };
+        return Compared { name, mean, expected, t: None, p: if left == 0.0 { 1.0 } else { 0.0 }, detects: slack };
     }
     // Welch and Satterthwaite; a side without spread has no part in it.
     let share = |(e, n): (f64, f64)| {
@@ -251,28 +243,62 @@ mod tests {
     }
 
     #[test]
-    fn a_bias_in_one_tile_is_named_and_a_tile_of_rare_hits_is_pooled() {
+    fn places_have_the_pixels_of_their_tiles() {
+        let tiling = Tiling::new(10, 7);
+        let pixels: Vec<f64> = (0..=20).map(|place| tiling.pixels(place)).collect();
+        assert_eq!(pixels[..20].iter().sum::<f64>(), 70.0);
+        assert_eq!((pixels[0], pixels[15], pixels[20]), (4.0, 2.0, 70.0));
+    }
+
+    #[test]
+    fn a_bias_in_one_tile_is_named() {
         let tiling = Tiling::new(4, 1);
         let truth = series(1, 5, 64, |_, u| u);
         let same = series(2, 5, 64, |_, u| u);
         let level = 1e-3;
-        let rules = Rules { allowance: 0.0, unseen: 0.0, level };
+        let rules = Rules { allowance: 0.0, rare: Rare::NOTHING, level };
         let compared = compare(&tiling, &same, &Truth::Replicates(&truth), rules);
         assert!(compared.p > level && compared.places.len() == 5, "{compared:?}");
         let biased = series(2, 5, 64, |place, u| if place == 2 { u + 0.5 } else { u });
         let compared = compare(&tiling, &biased, &Truth::Replicates(&truth), rules);
         assert!(compared.p < level && compared.worst().name == "tile (2, 0) of 4 × 1", "{compared:?}");
         assert!(compared.worst().detects < 0.5 && compared.differing(level) == 1);
-        // Known numbers, an allowance, and tiles in which almost nothing happens.
-        let rare = series(3, 5, 64, |place, u| if place < 2 { f64::from(u8::from(u < 0.03)) } else { u });
-        let compared = compare(&tiling, &rare, &Truth::Exact(&[0.03, 0.03, 0.5, 0.5, 0.5]), rules);
-        assert!(compared.places.iter().any(|p| p.name == "2 tiles pooled") && compared.p > level, "{compared:?}");
         let constant = series(4, 5, 64, |_, _| 0.25);
         let compared = compare(&tiling, &constant, &Truth::Exact(&[0.25, 0.25, 0.2501, 0.25, 0.25]), rules);
         assert!(compared.p == 0.0 && compared.worst().name.contains("(2, 0)"), "{compared:?}");
-        // None of 64 replicates met what would add 10⁻⁴ to the mean: no evidence, as it may be rare.
-        let missed = Rules { unseen: 1e-3, ..rules };
-        assert_eq!(compare(&tiling, &constant, &Truth::Exact(&[0.2501; 5]), missed).p, 1.0);
         assert_eq!(compare(&tiling, &constant, &Truth::Exact(&[0.2501; 5]), Rules { allowance: 1e-3, ..rules }).p, 1.0);
+    }
+
+    /// The claim of [`Rare`]: for every expected number of rare hits, the chance of so few that k + √(2 ln(2/δ)) √k + ln(2/δ) is below it is δ/2
+    /// at most (the other half is for too many).
+    #[test]
+    fn poissons_numbers_fall_short_no_further_than_stated() {
+        for delta in [1e-2f64, 1e-4, 1e-6, 1e-9, 1e-12] {
+            let log = libm::log(2.0 / delta);
+            for step in 1..4000 {
+                let expected = f64::from(step) * 0.1;
+                // P(K ≤ k), term by term, while k is among those that claim too little.
+                let (mut term, mut chance, mut k) = (libm::exp(-expected), 0.0, 0.0);
+                while k + (2.0 * log * k).sqrt() + log < expected {
+                    chance += term;
+                    k += 1.0;
+                    term *= expected / k;
+                }
+                assert!(chance <= 0.5 * delta, "{expected} expected, δ = {delta}: {chance:e}");
+            }
+        }
+    }
+
+    /// None of 64 replicates of one sample met what would add 0.01 to the mean: no evidence against something rare; of a million samples
+    /// it is.
+    #[test]
+    fn what_was_not_seen_may_be_rare() {
+        let tiling = Tiling::new(4, 1);
+        let dark = series(4, 5, 64, |_, _| 0.0);
+        let with = |samples: f64| {
+            let rare = Rare { range: 1.0, samples: [samples, f64::INFINITY] };
+            compare(&tiling, &dark, &Truth::Exact(&[0.01; 5]), Rules { allowance: 0.0, rare, level: 1e-6 }).p
+        };
+        assert_eq!((with(64.0), with(1e6)), (1.0, 0.0));
     }
 }

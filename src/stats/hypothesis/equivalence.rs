@@ -31,6 +31,12 @@ pub fn equivalence_test(replicates: &[f64], exact: f64, margin: f64, family: Fam
     within(seen, [-margin, margin], 0.0, family)
 }
 
+/// The same for an estimate of which only its `value`, standard `error` and the degrees of freedom of that are known (∞ for the
+/// normal distribution): is its expectation shown to lie within `margin` > 0 of 0?
+pub fn equivalence_of_estimate(value: f64, error: f64, freedom: f64, margin: f64, family: Family) -> Verdict {
+    within(Seen { value, error, freedom }, [-margin, margin], 0.0, family)
+}
+
 /// Are the expectations of independent replicates `a` and `b` shown to differ by less than `margin` > 0? Welch's standard
 /// error and degrees of freedom; otherwise as [`equivalence_test`].
 pub fn equivalence_of_means(a: &[f64], b: &[f64], margin: f64, family: Family) -> Verdict {

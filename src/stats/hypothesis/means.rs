@@ -4,6 +4,7 @@ use super::{Family, Outcome, POWER, Verdict};
 use crate::mutants::{Mutant, planted};
 use crate::stats::moments::{Moments, student_t_quantile, two_sided_factor};
 use crate::stats::special::{incomplete_gamma_upper, normal_upper_tail, student_two_sided, student_two_sided_inverse};
+use crate::stats::tails::Tails;
 
 /// Two numbers this close, relative to the larger, differ by rounding alone; no test can speak about less.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
@@ -40,6 +41,16 @@ pub fn t_test(replicates: &[f64], exact: f64, family: Family) -> Verdict {
         return Verdict::undefined(family, NOT_FINITE);
     }
     against_exact(mean, exact, error, (moments.n() - 1) as f64, family)
+}
+
+/// As [`t_test`] for values that are squares of errors, or other values no less skewed to the right than these: variances
+/// against exact ones.
+///
+/// Its level is that of [`Family::for_skewed`] at the skewness of the values, or of squares of normal numbers, √8, if that is more: of
+/// values too low as a whole the skewness is seen too low as well. Holds its rate to leading order from some thousand values on.
+pub fn t_test_of_squares(squares: &[f64], exact: f64, family: Family) -> Verdict {
+    let seen = Tails::of(squares).map_or(0.0, |tails| tails.skewness);
+    t_test(squares, exact, family.for_skewed(seen.max(8f64.sqrt()), squares.len()))
 }
 
 /// Is a `value` of known `standard_error` equal to `exact`? Two-sided test on the normal distribution.

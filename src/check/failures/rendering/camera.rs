@@ -13,6 +13,7 @@ use crate::scene::camera::Aperture;
 use crate::scene::compile::{Scene, Stage};
 use crate::scene::config::{CameraConfig, SceneConfig};
 use crate::scene::mesh::Mesh;
+use crate::stats::hypothesis::t_test_of_squares;
 use crate::stats::{Moments, t_test};
 
 /// The checks of this file.
@@ -84,7 +85,7 @@ fn lens_without_root(context: &Context) -> Finding {
     let mut tally = Tally::new();
     tally.verdict("E r", &t_test(&ours, 2.0 / 3.0, family), 1.0);
     let squares: Vec<f64> = ours.iter().map(|r| r * r).collect();
-    tally.verdict("E r²", &t_test(&squares, 0.5, family), 1.0);
+    tally.verdict("E r²", &t_test_of_squares(&squares, 0.5, family), 1.0);
     let seen = t_test(&wrong, 2.0 / 3.0, family);
     tally.fact(format!("r = u is seen: {seen}"), !seen.holds());
     let means = [ours, wrong].map(|radii| radii.into_iter().collect::<Moments>().mean().unwrap_or(f64::NAN));

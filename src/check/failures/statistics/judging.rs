@@ -10,6 +10,7 @@ use crate::experiment::results::{Count, Kind as ItemKind, MadeWith};
 use crate::film::Picture;
 use crate::sampling::{Preset, SamplerSpec, point_set};
 use crate::stats::discrepancy::{L2Kind, Points, l2_squared};
+use crate::stats::hypothesis::t_test_of_squares;
 use crate::stats::hypothesis::{benjamini_hochberg, clopper_pearson, holm, welch};
 use crate::stats::image_error::{mse, mse_unbiased};
 use crate::stats::{
@@ -229,8 +230,8 @@ fn shared_seeds(context: &Context) -> Finding {
     let family = context.family(2);
     let mut tally = Tally::new();
     let (small, true_error) = (1.0 / n as f64 - 1.0 / all as f64, 1.0 / n as f64 + 1.0 / all as f64);
-    tally.verdict("MSE with shared samples", &t_test(&shared, small, family), small);
-    tally.verdict("MSE with samples of its own", &t_test(&apart, true_error, family), true_error);
+    tally.verdict("MSE with shared samples", &t_test_of_squares(&shared, small, family), small);
+    tally.verdict("MSE with samples of its own", &t_test_of_squares(&apart, true_error, family), true_error);
     let refused = |test: Picture| {
         let reference = Reference::new(("R.exr", picture(0.5, "pots", "sobol", "7")), None);
         reference.and_then(|r| r.check("T.exr", &test)).err().map(|e| e.to_string()).unwrap_or_default()
@@ -276,7 +277,7 @@ fn within_a_net(context: &Context) -> Finding {
     let truth = 7.0 * 22.0 / (576.0 * cube);
     let family = context.family(3);
     let mut tally = Tally::new();
-    tally.verdict("variance between replicates", &t_test(&squares, truth, family), truth);
+    tally.verdict("variance between replicates", &t_test_of_squares(&squares, truth, family), truth);
     tally.verdict("mean", &t_test(&estimates, 0.25, family), 0.25);
     let ratio = sum(naive.iter().copied()) / f64::from(replicates) / truth;
     // E s²/n = (σ² − Var)/(n − 1) = 756.7 true variances; s² varies by some per cent, its mean over the replicates by a tenth of one.
@@ -365,7 +366,7 @@ fn l2_star_squares(context: &Context, sampler: &str, n: u32, replicates: u32) ->
 fn mean_of_roots(context: &Context) -> Finding {
     let (n, few) = (64_u32, 16_u32);
     let count = context.replicates(8_000, 6_000);
-    let nets = l2_star_squares(context, "ld:shuffle:owen@each", n, context.replicates(1_000, 400));
+    let nets = l2_star_squares(context, "ld:shuffle:owen@each", n, context.replicates(2_000, 1_000));
     let (nets, random) = match (nets, l2_star_squares(context, "uniform", few, count)) {
         (Ok(nets), Ok(random)) => (nets, random),
         (Err(what), _) | (_, Err(what)) => return Finding::broken(what),
@@ -374,8 +375,8 @@ fn mean_of_roots(context: &Context) -> Finding {
     let of_random = 5.0 / (36.0 * f64::from(few));
     let family = context.family(3);
     let mut tally = Tally::new();
-    tally.verdict("mean of L2*² of nets", &t_test(&nets, of_nets, family), of_nets);
-    tally.verdict("mean of L2*² of independent points", &t_test(&random, of_random, family), of_random);
+    tally.verdict("mean of L2*² of nets", &t_test_of_squares(&nets, of_nets, family), of_nets);
+    tally.verdict("mean of L2*² of independent points", &t_test_of_squares(&random, of_random, family), of_random);
     let roots: Vec<f64> = random.iter().map(|s| s.sqrt()).collect();
     let (below, mean) = (t_test(&roots, of_random.sqrt(), family), sum(roots.iter().copied()) / f64::from(count));
     let is_below = !below.holds() && mean < of_random.sqrt();

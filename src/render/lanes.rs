@@ -1,0 +1,293 @@
+//! A packet of samples on its way: numbers, camera rays, surfaces, lights, shadow rays, radiance, a lane for each sample.
+//!
+//! Everything between the queries is straight arithmetic over all lanes, which [`Kernel::run`](crate::accel::Kernel::run) compiles to
+//! vector instructions. What a scene lacks is asked once a packet.
+
+#![allow(clippy::needless_range_loop, reason = "a lane is a column of several rows at once")]
+
+use glam::{Vec2, Vec3};
+
+use crate::accel::{LANES, NOTHING, Packet, Ray, Row, column, set_column};
+use crate::mutants::{Mutant, planted};
+use crate::sampling::{Dim2, PixelKey, PointSource};
+use crate::scene::camera::{Aperture, PixelSample};
+use crate::scene::compile::Scene;
+use crate::scene::geometry::SurfaceRows;
+use crate::scene::light::{LightPoint, LightSet, Parallelogram};
+
+use super::direct::{arrival, choose};
+
+/// Consecutive samples of one pixel, and the lanes they take.
+#[derive(Clone, Copy)]
+pub(super) struct Span {
+    /// The pixel's place in its tile.
+    pub pixel: usize,
+    pub x: u32,
+    pub y: u32,
+    pub first: u32,
+    pub lane: usize,
+    pub count: usize,
+}
+
+/// A lane without a ray.
+const IDLE: f32 = f32::NEG_INFINITY;
+
+/// Everything a packet of samples needs, kept between packets: nothing is allocated per sample.
+#[repr(align(64))]
+pub(super) struct Lanes {
+    /// Where in its square each pixel is looked at, and the numbers of lens, light pick and light point.
+    pixel: [Row; 2],
+    lens: [Row; 2],
+    pick: Row,
+    light: [Row; 2],
+    /// The camera rays.
+    origin: [Row; 3],
+    direction: [Row; 3],
+    view: Packet,
+    surfaces: SurfaceRows,
+    albedo: [Row; 3],
+    shadow_origin: [Row; 3],
+    shadow_direction: [Row; 3],
+    shadow: Packet,
+    pub radiance: [Row; 3],
+    used: usize,
+    pub ray_count: u64,
+}
+
+impl Default for Lanes {
+    fn default() -> Self {
+        let (two, three) = ([[0.5; LANES]; 2], [[0.0; LANES]; 3]);
+        Self {
+            pixel: two,
+            lens: two,
+            pick: [0.0; LANES],
+            light: two,
+            origin: three,
+            direction: three,
+            view: Packet::default(),
+            surfaces: SurfaceRows::default(),
+            albedo: three,
+            shadow_origin: three,
+            shadow_direction: three,
+            shadow: Packet::default(),
+            radiance: three,
+            used: 0,
+            ray_count: 0,
+        }
+    }
+}
+
+impl Lanes {
+    /// Traces the samples of `spans`, which fill the lanes from the first on.
+    #[inline(always)]
+    pub fn sample<S: PointSource>(&mut self, scene: &Scene, source: &S, spans: &[Span]) {
+        self.used = spans.last().map_or(0, |s| s.lane + s.count);
+        self.look_up(scene, source, spans);
+        self.aim(scene, spans);
+        scene.accel.closest(&mut self.view);
+        self.ray_count += self.used as u64;
+        self.shade(scene);
+    }
+
+    /// Reads the spans' numbers, for the decisions that the scene makes.
+    #[inline(always)]
+    fn look_up<S: PointSource>(&mut self, scene: &Scene, source: &S, spans: &[Span]) {
+        let pixel = match &scene.camera.pixel {
+            PixelSample::Center => None,
+            PixelSample::Sampled(dim) => Some(dim),
+        };
+        let lens = match &scene.camera.aperture {
+            Aperture::Pinhole => None,
+            Aperture::ThinLens { lens, .. } => Some(lens),
+        };
+        let (pick, light) = match &scene.lights {
+            None | Some(LightSet::Dark) => (None, None),
+            Some(LightSet::One { point, .. }) => (None, Some(point)),
+            Some(LightSet::Many { pick, point, .. }) => (Some(pick), Some(point)),
+        };
+        for span in spans {
+            let key = PixelKey::new(span.x, span.y);
+            let lanes = span.lane..span.lane + span.count;
+            let planes: [(Option<&Dim2>, &mut [Row; 2]); 3] =
+                [(pixel, &mut self.pixel), (lens, &mut self.lens), (light, &mut self.light)];
+            for (dim, [x, y]) in planes {
+                if let Some(dim) = dim {
+                    source.fill_2d(key, span.first, dim, &mut x[lanes.clone()], &mut y[lanes.clone()]);
+                }
+            }
+            if let Some(dim) = pick {
+                source.fill_1d(key, span.first, dim, &mut self.pick[lanes]);
+            }
+        }
+    }
+
+    /// Sets up the camera rays.
+    #[inline(always)]
+    fn aim(&mut self, scene: &Scene, spans: &[Span]) {
+        let (mut x, mut y, mut limit) = ([0.0; LANES], [0.0; LANES], [IDLE; LANES]);
+        for span in spans {
+            for lane in span.lane..span.lane + span.count {
+                (x[lane], y[lane], limit[lane]) = (span.x as f32, span.y as f32, f32::INFINITY);
+            }
+        }
+        let camera = &scene.camera;
+        let at = |lane: usize| Vec2::new(x[lane] + self.pixel[0][lane], y[lane] + self.pixel[1][lane]);
+        match &camera.aperture {
+            Aperture::Pinhole => {
+                for lane in 0..LANES {
+                    let ray = camera.pinhole_ray(at(lane));
+                    set_column(&mut self.origin, lane, ray.origin);
+                    set_column(&mut self.direction, lane, ray.direction);
+                }
+            }
+            Aperture::ThinLens { radius, focal_depth, .. } => {
+                for lane in 0..LANES {
+                    let u = Vec2::new(self.lens[0][lane], self.lens[1][lane]);
+                    let ray = camera.lens_ray(at(lane), u, *radius, *focal_depth);
+                    set_column(&mut self.origin, lane, ray.origin);
+                    set_column(&mut self.direction, lane, ray.direction);
+                }
+            }
+        }
+        self.view.set_all(&self.origin, &self.direction, &limit);
+    }
+
+    /// What the camera rays see: emitters, surfaces under the light they chose, or albedo alone.
+    #[inline(always)]
+    fn shade(&mut self, scene: &Scene) {
+        self.radiance = [[0.0; LANES]; 3];
+        let mut triangles = *self.view.triangles();
+        let hit = triangles.map(|t| t != NOTHING);
+        let Some(&some) = triangles.iter().find(|&&t| t != NOTHING) else { return };
+        // Lanes that met nothing work on another's triangle; nothing comes of it.
+        for lane in 0..LANES {
+            triangles[lane] = if hit[lane] { triangles[lane] } else { some };
+        }
+        self.surfaces.fill(&scene.faces, &triangles, &self.origin, &self.direction);
+        self.look_at_materials(scene, &triangles);
+        let Some(lights) = &scene.lights else {
+            for c in 0..3 {
+                for lane in 0..LANES {
+                    self.radiance[c][lane] = if hit[lane] { self.albedo[c][lane] } else { 0.0 };
+                }
+            }
+            return;
+        };
+        let is_emitter = self.surfaces.material.map(|m| scene.mesh.materials[m as usize].is_emitter);
+        let mut open = [0u32; LANES];
+        for lane in 0..LANES {
+            open[lane] = u32::from(hit[lane] & !is_emitter[lane]);
+        }
+        let count = match lights {
+            LightSet::Dark => 0,
+            LightSet::One { light, .. } => match light.parallelogram() {
+                Some(shape) => self.light_from(shape, light.area, light.emission, &open),
+                None => self.light_from_any(scene, lights, &open),
+            },
+            LightSet::Many { .. } => self.light_from_any(scene, lights, &open),
+        };
+        if count > 0 {
+            self.ray_count += u64::from(count);
+            scene.accel.occluded(&mut self.shadow);
+            let stopped = self.shadow.triangles();
+            for c in 0..3 {
+                for lane in 0..LANES {
+                    self.radiance[c][lane] = if stopped[lane] == NOTHING { self.radiance[c][lane] } else { 0.0 };
+                }
+            }
+        }
+        if is_emitter.contains(&true) {
+            for lane in (0..LANES).filter(|&lane| hit[lane] & is_emitter[lane]) {
+                let material = self.surfaces.material[lane];
+                set_column(&mut self.radiance, lane, scene.mesh.materials[material as usize].emission);
+            }
+        }
+    }
+
+    /// Looks up albedos, with their textures.
+    #[inline(always)]
+    fn look_at_materials(&mut self, scene: &Scene, triangles: &[u32; LANES]) {
+        for lane in 0..LANES {
+            let material = &scene.mesh.materials[self.surfaces.material[lane] as usize];
+            let albedo = match material.texture {
+                None => material.albedo,
+                Some(texture) => {
+                    let uv = self.surfaces.uv(&scene.faces[triangles[lane] as usize], lane);
+                    material.albedo * scene.mesh.textures[texture as usize].sample(uv)
+                }
+            };
+            set_column(&mut self.albedo, lane, albedo);
+        }
+    }
+
+    /// Contributions of one parallelogram to the lanes that are `open`, and their shadow rays; how many there are.
+    #[inline(always)]
+    fn light_from(&mut self, shape: &Parallelogram, area: f32, emission: Vec3, open: &[u32; LANES]) -> u32 {
+        let mut limit = [IDLE; LANES];
+        let mut count = 0;
+        for lane in 0..LANES {
+            let to = shape.point(Vec2::new(self.light[0][lane], self.light[1][lane]));
+            let lit = self.receive(lane, &to, area, emission, 1.0, open[lane] != 0);
+            limit[lane] = if lit { shadow_end() } else { IDLE };
+            count += u32::from(lit);
+        }
+        self.shadow.set_all(&self.shadow_origin, &self.shadow_direction, &limit);
+        count
+    }
+
+    /// As [`Self::light_from`], for lights of any shape, of which each lane picks one.
+    #[inline(always)]
+    fn light_from_any(&mut self, scene: &Scene, lights: &LightSet, open: &[u32; LANES]) -> u32 {
+        let (mut position, mut normal, mut emission) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+        let (mut area, mut probability) = ([0.0; LANES], [1.0; LANES]);
+        for lane in 0..LANES {
+            let Some((light, chance)) = choose(lights, scene.estimator, self.pick[lane]) else { return 0 };
+            let to = light.point(Vec2::new(self.light[0][lane], self.light[1][lane]));
+            set_column(&mut position, lane, to.position);
+            set_column(&mut normal, lane, to.normal);
+            set_column(&mut emission, lane, light.emission);
+            (area[lane], probability[lane]) = (light.area, chance);
+        }
+        let mut limit = [IDLE; LANES];
+        let mut count = 0;
+        for lane in 0..LANES {
+            let to = LightPoint { position: column(&position, lane), normal: column(&normal, lane) };
+            let emission = column(&emission, lane);
+            let lit = self.receive(lane, &to, area[lane], emission, probability[lane], open[lane] != 0);
+            limit[lane] = if lit { shadow_end() } else { IDLE };
+            count += u32::from(lit);
+        }
+        self.shadow.set_all(&self.shadow_origin, &self.shadow_direction, &limit);
+        count
+    }
+
+    /// k_a · L_i · (ω_i·n) over the light's probability, if the lane is open and light and surface face each other.
+    #[inline(always)]
+    fn receive(
+        &mut self,
+        lane: usize,
+        to: &LightPoint,
+        area: f32,
+        emission: Vec3,
+        probability: f32,
+        open: bool,
+    ) -> bool {
+        let arrival = arrival(to, area, &self.surfaces.at(lane));
+        let lit = arrival.lit & open;
+        let radiance = column(&self.albedo, lane) * (emission * arrival.weight) / probability;
+        for (row, c) in self.radiance.iter_mut().zip(radiance.to_array()) {
+            let c = if planted(Mutant::SampleClamped) { c.min(1.0) } else { c };
+            row[lane] = if lit { c } else { 0.0 };
+        }
+        let Ray { origin, direction } = arrival.shadow_ray;
+        set_column(&mut self.shadow_origin, lane, origin);
+        set_column(&mut self.shadow_direction, lane, direction);
+        lit
+    }
+}
+
+/// Where a shadow ray ends: at the light's point.
+#[inline(always)]
+fn shadow_end() -> f32 {
+    if planted(Mutant::ShadowRayTooLong) { 1.01 } else { 1.0 }
+}
