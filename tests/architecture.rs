@@ -75,7 +75,8 @@ const DOORS: &[(&str, &[&str])] = &[
     ("plotters", &["report"]),
     ("ttf_noto_sans", &["report"]),
     ("obvhs", &["accel"]),
-    ("tobj", &["scene"]),
+    // Benchmarks time it alone, beside the scene's loader.
+    ("tobj", &["scene", "bench"]),
     // Pictures are written and read by film, textures decoded by the scene's loader.
     ("image", &["film", "scene"]),
     ("exr", &["film"]),

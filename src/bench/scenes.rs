@@ -17,10 +17,6 @@ use crate::scene::compile::{Scene, Stage};
 use crate::scene::config::{CameraConfig, FramebufferConfig, SceneConfig};
 use crate::scene::mesh::{Material, Mesh};
 
-/// Quads along a side of the ground at refinement 1.
-const GROUND_QUADS: u32 = 206;
-/// Quads along an edge of the cube that becomes a ball, at refinement 1.
-const BALL_QUADS: u32 = 20;
 /// Balls stand on a jittered grid of this many columns and rows.
 const BALL_GRID: (u32, u32) = (6, 4);
 /// Half the side of the ground, scene units.
@@ -28,12 +24,15 @@ const HALF_SIDE: f64 = 12.0;
 /// Seed of all bumps and places.
 const SEED: u64 = 0x6c61_6e64;
 
-/// A landscape of one design; `refinement` multiplies the quads along every edge.
+/// A landscape of one design at some tessellation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Landscape {
     /// Its name in tables and files.
     pub name: &'static str,
-    refinement: u32,
+    /// Quads along a side of the ground.
+    ground_quads: u32,
+    /// Quads along an edge of the cube that becomes a ball.
+    ball_quads: u32,
 }
 
 /// An indexed surface of one material.
@@ -48,24 +47,24 @@ struct Surface {
 
 impl Landscape {
     /// 200 074 triangles.
-    pub const MEDIUM: Self = Self { name: "landscape-200k", refinement: 1 };
+    pub const MEDIUM: Self = Self { name: "landscape-200k", ground_quads: 206, ball_quads: 20 };
     /// 3 201 154 triangles.
-    pub const LARGE: Self = Self { name: "landscape-3200k", refinement: 4 };
+    pub const LARGE: Self = Self { name: "landscape-3200k", ground_quads: 824, ball_quads: 80 };
     /// Both, the smaller first.
     pub const ALL: [Self; 2] = [Self::MEDIUM, Self::LARGE];
 
-    /// The same design with the quads along every edge times `refinement`, 1 to 8.
+    /// The same design with `quads` ∈ 1..=80 along the edges of a ball's faces, and 10.3 times as many along the ground's side.
     ///
     /// # Panics
-    /// For another refinement.
-    pub fn refined(refinement: u32) -> Self {
-        assert!((1..=8).contains(&refinement), "a refinement of {refinement}");
-        Self { name: "landscape", refinement }
+    /// For another number.
+    pub fn of_quads(quads: u32) -> Self {
+        assert!((1..=80).contains(&quads), "{quads} quads");
+        Self { name: "landscape", ground_quads: 103 * quads / 10, ball_quads: quads }
     }
 
     /// Triangles: 2 a quad of the ground, 12 a quad of a cube's face for each ball, 2 of the light.
     pub fn triangle_count(self) -> usize {
-        let (ground, ball) = ((GROUND_QUADS * self.refinement) as usize, (BALL_QUADS * self.refinement) as usize);
+        let (ground, ball) = (self.ground_quads as usize, self.ball_quads as usize);
         2 * ground * ground + 12 * ball * ball * (BALL_GRID.0 * BALL_GRID.1) as usize + 2
     }
 
@@ -129,9 +128,9 @@ impl Landscape {
 
     /// Ground, balls, light, in this order.
     fn surfaces(self) -> Vec<Surface> {
-        let mut surfaces = vec![ground(GROUND_QUADS * self.refinement)];
+        let mut surfaces = vec![ground(self.ground_quads)];
         let (columns, rows) = BALL_GRID;
-        surfaces.extend((0..columns * rows).map(|i| Ball::standing(i).surface(BALL_QUADS * self.refinement)));
+        surfaces.extend((0..columns * rows).map(|i| Ball::standing(i).surface(self.ball_quads)));
         surfaces.push(light());
         surfaces
     }
@@ -360,6 +359,8 @@ mod tests {
     #[test]
     fn the_counts_are_as_stated() {
         assert_eq!(Landscape::ALL.map(Landscape::triangle_count), [200_074, 3_201_154]);
+        assert_eq!(Landscape::of_quads(20).triangle_count(), 200_074);
+        assert_eq!(Landscape::of_quads(5).mesh().len(), Landscape::of_quads(5).triangle_count());
         let mesh = Landscape::MEDIUM.mesh();
         assert_eq!(mesh.len(), 200_074);
         assert_eq!((mesh.normals.len(), mesh.uvs.len(), mesh.material_of.len()), (200_074, 200_074, 200_074));
