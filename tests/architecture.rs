@@ -63,7 +63,11 @@ const FLOORS: &[Floor] = &[
             "error",
         ],
     },
-    Floor { module: "bench", may_use: &["render", "scene", "sampling", "accel", "stats", "points", "film", "error"] },
+    Floor {
+        module: "bench",
+        // Of experiments the description of the machine alone.
+        may_use: &["experiment::machine", "render", "scene", "sampling", "accel", "stats", "film", "error"],
+    },
 ];
 
 /// Outside packages and the rooms that may name them: a replaced package is one room's work.
