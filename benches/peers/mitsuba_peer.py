@@ -45,6 +45,7 @@ def main():
     import mitsuba as mi
 
     mi.set_variant(args.variant)
+    mi.set_log_level(mi.LogLevel.Error)
     import drjit as dr
 
     def read(path):

@@ -7,10 +7,10 @@ root=$(cd "$here/../.." && pwd)
 work=${1:-"$root/target/peers"}
 [ $# -gt 0 ] && shift
 mkdir -p "$work"
-cargo build --release --quiet --manifest-path "$root/Cargo.toml"
 binary=${SAMPLER_LAB:-"$root/target/release/sampler-lab"}
+[ -n "${SAMPLER_LAB:-}" ] || cargo build --release --quiet --manifest-path "$root/Cargo.toml"
 [ -x "$work/venv/bin/python" ] || python3 -m venv "$work/venv"
-"$work/venv/bin/pip" install --quiet mitsuba embreex numpy
+"$work/venv/bin/pip" install --quiet mitsuba numpy
 "$binary" bench --write-scenes "$work/scenes" --quiet
 
 # The variant llvm_ad_rgb compiles with the system's LLVM, which has to be new enough (15 is too old for Mitsuba 3.9). Where there
