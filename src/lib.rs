@@ -1,6 +1,7 @@
 //! What does the choice of sample points do to a rendered image? Answered with numbers.
 pub mod accel;
 pub mod analytic;
+pub mod bench;
 pub mod check;
 pub mod compare;
 pub mod error;

@@ -63,6 +63,11 @@ const FLOORS: &[Floor] = &[
             "error",
         ],
     },
+    Floor {
+        module: "bench",
+        // Of experiments the description of the machine alone.
+        may_use: &["experiment::machine", "render", "scene", "sampling", "accel", "stats", "film", "error"],
+    },
 ];
 
 /// Outside packages and the rooms that may name them: a replaced package is one room's work.
@@ -74,7 +79,8 @@ const DOORS: &[(&str, &[&str])] = &[
     ("plotters", &["report"]),
     ("ttf_noto_sans", &["report"]),
     ("obvhs", &["accel"]),
-    ("tobj", &["scene"]),
+    // Benchmarks time it alone, beside the scene's loader.
+    ("tobj", &["scene", "bench"]),
     // Pictures are written and read by film, textures decoded by the scene's loader.
     ("image", &["film", "scene"]),
     ("exr", &["film"]),
@@ -373,13 +379,13 @@ fn the_kernels_do_no_input_or_output() {
     }
 }
 
-/// Nothing recorded depends on a clock: only timings of experiments and the binary read one.
+/// Nothing recorded depends on a clock: only timings of experiments, benchmarks and the binary read one.
 #[test]
 fn only_timings_read_a_clock() {
-    for file in sources().iter().filter(|f| !matches!(f.module(), "experiment" | "main")) {
+    for file in sources().iter().filter(|f| !matches!(f.module(), "experiment" | "bench" | "main")) {
         for (place, line) in file.numbered(&file.product) {
             for clock in ["Instant", "SystemTime", "_rdtsc"] {
-                assert!(!has_word(line, clock), "{place}: {clock} outside experiment and main");
+                assert!(!has_word(line, clock), "{place}: {clock} outside experiment, bench and main");
             }
         }
     }

@@ -1,5 +1,6 @@
 //! Arguments, and what goes where: results to stdout or files, all else to stderr.
 
+mod bench;
 mod check;
 mod compare;
 mod experiment;
@@ -50,6 +51,8 @@ enum Command {
     Compare(compare::Compare),
     /// Test the lab itself, or a sampler on a scene: verdicts with false-alarm rate and power
     Check(check::Check),
+    /// Measure speed: samplers, rays, renders, builds, loading, metrics, growth, memory
+    Bench(bench::Bench),
     /// Show or check a scene file
     Config(Config),
     /// Say what a sampler does, and which numbers its decisions read for a scene
@@ -70,6 +73,7 @@ impl Cli {
             Command::Measure(args) => args.run(),
             Command::Compare(args) => args.run(),
             Command::Check(args) => args.run(),
+            Command::Bench(args) => args.run(),
             Command::Config(args) => args.run(),
             Command::Explain(args) => args.run(),
         }

@@ -23,7 +23,7 @@ pub mod identity;
 mod images;
 pub mod lab;
 mod lines;
-mod machine;
+pub mod machine;
 mod measure;
 pub mod merge;
 pub mod origin;
