@@ -46,7 +46,8 @@ pub fn ratio_within(ratios: impl IntoIterator<Item = f64>) -> RatioFound {
 /// the variance `variance` (2 for squares of normal errors): both quantiles, of [`LEVEL`] and of `miss`/2, must fit
 /// into the band's half.
 pub fn replicates_for(miss: f64, variance: f64) -> u32 {
-    let quantile = |p: f64| student_t_quantile(1.0 - p, f64::INFINITY);
+    // No smaller p has a quantile in f64: a chance of 10⁻¹⁵ is as good as none.
+    let quantile = |p: f64| student_t_quantile(1.0 - p.max(1e-15), f64::INFINITY);
     let half = (quantile(LEVEL) + quantile(0.5 * miss)) / MARGIN;
     (half * half * variance).ceil() as u32
 }

@@ -10,8 +10,8 @@ use crate::experiment::results::{Count, Kind as ItemKind, MadeWith};
 use crate::film::Picture;
 use crate::sampling::{Preset, SamplerSpec, point_set};
 use crate::stats::discrepancy::{L2Kind, Points, l2_squared};
-use crate::stats::hypothesis::{t_test_of_skewed, t_test_of_squares};
 use crate::stats::hypothesis::{benjamini_hochberg, clopper_pearson, holm, welch};
+use crate::stats::hypothesis::{t_test_of_skewed, t_test_of_squares};
 use crate::stats::image_error::{mse, mse_unbiased};
 use crate::stats::{
     Family, Moments, binomial_test, fisher_test, loglog_slope, slope_with_interval, sum, t_interval, t_test,
