@@ -27,7 +27,7 @@ const CORNELL: [(&str, &str); 3] = [
 ];
 
 impl Lab {
-    /// One of [`Landscape::ALL`], in the size [`SIZE`].
+    /// One of [`Landscape::ALL`], 1280 × 720.
     pub fn landscape(&self, which: usize) -> &RefCell<Scene> {
         self.scenes[which].get_or_init(|| RefCell::new(Landscape::ALL[which].scene(SIZE)))
     }
