@@ -80,11 +80,11 @@ impl fmt::Display for Error {
 
 impl std::error::Error for Error {}
 
-/// The candidate nearest to `found` by edit distance, where it is near enough to be a misspelling.
+/// The candidate nearest to `found` by edit distance, capitals aside, where it is near enough to be a misspelling.
 pub fn did_you_mean<'a>(found: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     candidates
         .into_iter()
-        .map(|c| (edit_distance(found, c), c))
+        .map(|c| (edit_distance(&found.to_lowercase(), &c.to_lowercase()), c))
         .filter(|&(d, c)| d <= 1 + c.len().min(found.len()) / 3)
         .min_by_key(|&(d, _)| d)
         .map(|(_, c)| c)
@@ -113,6 +113,7 @@ mod tests {
     #[test]
     fn a_misspelt_key_is_suggested_and_a_strange_one_is_not() {
         assert_eq!(did_you_mean("lens_radus", ["fov", "lens_radius"]), Some("lens_radius"));
+        assert_eq!(did_you_mean("FOV", ["fov", "lens_radius"]), Some("fov"));
         assert_eq!(did_you_mean("banana", ["fov", "lens_radius"]), None);
     }
 }

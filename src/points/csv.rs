@@ -1,6 +1,6 @@
 //! Points as text, one a line.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use crate::error::{Error, Result};
@@ -15,23 +15,34 @@ pub fn to_csv(points: &[[f64; 2]]) -> String {
     text
 }
 
-/// Reads points from CSV: commas, an optional header, `#` comments, blank lines skipped, one point a line; LF or CR LF, with or
-/// without a byte order mark. Line by line: memory is 8 bytes a coordinate.
+/// Longest line that is read, in bytes: a million coordinates. What has no line ends is no CSV, and may have no end either.
+const LONGEST_LINE: u64 = 1 << 24;
+
+/// Reads points from CSV: commas, an optional header of names, `#` comments, blank lines skipped, one point a line; LF or CR LF,
+/// with or without a byte order mark. Line by line: memory is 8 bytes a coordinate.
 ///
 /// # Errors
-/// Kind `Input` with the line: a field that is no number (an empty one after a last comma too), a ragged row, a
-/// coordinate outside [0, 1]; no points at all; text that cannot be read or is no UTF-8.
+/// Kind `Input` with the line: a field that is no number (an empty one after a last comma too, and one in quotes), a ragged
+/// row, a coordinate outside [0, 1], text that is no UTF-8, a line above 16 MiB; no points at all; a file that cannot be read.
 pub fn read_csv(mut text: impl BufRead, source: &str) -> Result<Points> {
     let mut reading = Reading::default();
-    let mut line = String::new();
+    let mut line = Vec::new();
     for number in 1_u64.. {
         line.clear();
-        let read = text.read_line(&mut line);
-        if read.map_err(|e| Error::input(source, format!("expected a readable CSV file, found: {e}")))? == 0 {
+        let read = text.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut line);
+        let read = read.map_err(|e| Error::input(source, format!("expected a readable CSV file, found: {e}")))?;
+        if read == 0 {
             break;
         }
-        let line = if number == 1 { line.trim_start_matches('\u{feff}') } else { &line };
-        reading.take(line).map_err(|what| Error::input(format!("{source}: line {number}"), what))?;
+        let taken = match std::str::from_utf8(&line) {
+            _ if read as u64 == LONGEST_LINE && line.last() != Some(&b'\n') => {
+                Err(format!("expected a line of less than {LONGEST_LINE} bytes, found a longer one"))
+            }
+            Err(_) => Err("expected UTF-8 text, found other bytes".to_owned()),
+            Ok(line) if number == 1 => reading.take(line.trim_start_matches('\u{feff}')),
+            Ok(line) => reading.take(line),
+        };
+        taken.map_err(|what| Error::input(format!("{source}: line {number}"), what))?;
     }
     Points::new(reading.dimension.unwrap_or(0), reading.coordinates).map_err(|error| Error::input(source, error))
 }
@@ -54,8 +65,8 @@ impl Reading {
         let fields = || line.split(',').map(str::trim);
         let is_first = self.dimension.is_none();
         let expected = *self.dimension.get_or_insert(fields().count());
-        // Words, none of which begins like a number: a first point that is misspelt is no header.
-        let is_word = |f: &str| f.chars().next().is_some_and(|c| !c.is_ascii_digit() && !"+-.".contains(c));
+        // Names, in quotes or not, each begun by a letter: a first point that is misspelt, quoted or bracketed is no header.
+        let is_word = |f: &str| f.trim_matches(['"', '\'']).starts_with(|c: char| c.is_alphabetic() || c == '_');
         if is_first && fields().all(|f| f.parse::<f64>().is_err() && is_word(f)) {
             return Ok(());
         }
@@ -129,10 +140,31 @@ mod tests {
             ("0.1,0.2\n0.1,0.2,0.3\n", "line 2: expected 2 coordinates, found 3"),
             ("x,y\nx,y\n0.1,0.2\n", "line 2: expected a number in [0, 1], found \"x\""),
             ("x,y,z\n0.1,0.2\n", "line 2: expected 3 coordinates, found 2"),
+            // First points that are no headers: each would be lost without a word.
+            ("\"0.1\",\"0.2\"\n0.3,0.4\n", "line 1: expected a number in [0, 1], found \"\"0.1\"\""),
+            ("(0.1;0.2)\n0.3\n", "line 1: expected a number in [0, 1], found \"(0.1;0.2)\""),
+            ("\u{2212}0.1,\u{2212}0.2\n0.3,0.4\n", "line 1: expected a number in [0, 1]"),
+            ("$0.1,$0.2\n0.3,0.4\n", "line 1: expected a number in [0, 1]"),
         ] {
             let error = read(text).unwrap_err();
             assert!(error.to_string().contains(needle), "{text:?}: {error}");
             assert_eq!(error.exit_code(), 2);
         }
+    }
+
+    #[test]
+    fn headers_are_names_in_quotes_or_not() {
+        for header in ["x,y", "\"x\",\"y\"", "'u 1','v 2'", "_a,θ"] {
+            assert_eq!(read(&format!("{header}\n0.1,0.2\n")).unwrap().n(), 1, "{header}");
+        }
+    }
+
+    #[test]
+    fn bytes_that_are_no_text_name_their_line_and_a_line_without_end_is_not_waited_for() {
+        let error = read_csv(&b"0.1,0.2\n# caf\xe9\n0.3,0.4\n"[..], "a.csv").unwrap_err();
+        assert_eq!(error.to_string(), "a.csv: line 2: expected UTF-8 text, found other bytes");
+        let endless = std::io::BufReader::new(std::io::repeat(b'0'));
+        let error = read_csv(endless, "a.csv").unwrap_err();
+        assert!(error.to_string().starts_with("a.csv: line 1: expected a line of less than"), "{error}");
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::sampling::{Decision, Order, Points, Preset};
 
+use super::super::charts::of_scene;
 use super::super::evidence::{Answer, Limit, below};
 use super::super::markdown::{Page, link_to, table_ref};
 use super::super::numbers::{estimate, listed, p_words, short, signed_estimate};
@@ -10,6 +11,7 @@ use super::coupling::{Dependence, SetTests, Tests, pair_words};
 use super::decisions;
 use super::identical::{Identity, bytes};
 use super::neighbours::{NeighbourTests, patterns};
+use super::pixels;
 use super::titles;
 use super::words::{against_one, bias_short, main_scene, name, rmse_ratio, rows, scene_name, times};
 
@@ -208,8 +210,13 @@ fn identical(summary: &Summary, asked: &Asked, scene: usize) -> Option<String> {
         n => format!("{n} are different ones"),
     };
     let means = asked.identity.truth_words(summary, scene).map_or(String::new(), |words| format!(". Yet {words}"));
+    let pictured = summary.pictured.iter().filter(|set| !set.shots.is_empty());
+    let pictured = pictured.min_by_key(|set| set.scene != scene).map(|set| &summary.scenes[set.scene].name);
+    let looks = pictured.map_or(String::new(), |pictured| {
+        format!("; how different pictures look, by FLIP: {}", table_ref(&of_scene("pictures", pictured)))
+    });
     Some(format!(
-        "**Identical?** By their bytes, of {} samplers' images of {} at {most} spp {words}{means} ({}, against uniform's {}).",
+        "**Identical?** By their bytes, of {} samplers' images of {} at {most} spp {words}{means} ({}, against uniform's {}{looks}).",
         found.images,
         scene_name(summary, scene),
         table_ref("means"),
@@ -309,8 +316,12 @@ fn between_pixels(summary: &Summary, asked: &Asked) -> Option<String> {
         .max_by(|a, b| a.2.value.total_cmp(&b.2.value));
     let (scene, cell, rho) = alike?;
     let p = asked.neighbours.of(scene, cell.sampler).and_then(|test| test.p);
+    let spectra = match pixels::are_there(summary) {
+        true => format!(", its spectrum {}", table_ref("error-spectra")),
+        false => String::new(),
+    };
     Some(format!(
-        "between pixels it turns noise into structure: {} in {} has ρ = {}, {} ({}) {}",
+        "between pixels it turns noise into structure: {} in {} has ρ = {}, {} ({}{spectra}) {}",
         name(summary, cell.sampler),
         scene_name(summary, scene),
         signed_estimate(&rho),

@@ -347,7 +347,7 @@ fn pair_row(summary: &Summary, t: &PairTests) -> Vec<String> {
 fn pair_sentences(summary: &Summary, tests: &Tests) -> Vec<String> {
     let told = |t: &PairTests| {
         let (c, p, _) = t.largest_mean()?;
-        Some(format!("{} (ρ = {}, {})", name(summary, t.sampler), signed_estimate(&c.rho), p_words(*p)))
+        Some(format!("{} (ρ = {}, {})", name(summary, t.sampler), rho_words(c), p_words(*p)))
     };
     let told_spread = |t: &PairTests| {
         let (c, _, p) = t.largest_spread()?;
@@ -387,8 +387,16 @@ pub fn pair_words(t: &PairTests) -> Option<String> {
         return Some(format!("spread {} of independent pairs', {}", estimate(&c.spread?.ratio), p_words(*p)));
     }
     let (c, p, _) = t.largest_mean()?;
-    let rho = if c.spread.is_some() { signed_estimate(&c.rho) } else { signed(c.rho.value) };
-    Some(format!("ρ = {rho}, {}", p_words(*p)))
+    Some(format!("ρ = {}, {}", rho_words(c), p_words(*p)))
+}
+
+/// `+0.97 [+0.96, +0.98]`; where no randomisation changes it without an interval, and with its unit: by the variance of uniform
+/// numbers, not by that of the set's own, it may come out a little above 1.
+fn rho_words(c: &Coupling) -> String {
+    match c.spread {
+        Some(_) => signed_estimate(&c.rho),
+        None => format!("{} in units of 1/12", signed(c.rho.value)),
+    }
 }
 
 #[cfg(test)]
@@ -411,6 +419,17 @@ mod tests {
         assert_eq!(set(2.0, 1e-6, 1.5, 1e-6).dependence(), Dependence::Positive);
         assert_eq!(set(0.1, 1e-6, 1.5, 1e-6).dependence(), Dependence::Mixed);
         assert!(set_cell_has_number(&set(0.1, 1e-6, 1.0, 0.9)));
+    }
+
+    #[test]
+    fn a_correlation_above_one_says_what_it_is_measured_by() {
+        let spec =
+            crate::sampling::SamplerSpec::parse("halton:sheet", crate::sampling::Preset::Sheet).expect("a sampler");
+        let pairs = between::measure(spec, &[Decision::Pixel, Decision::Lens], 4).expect("numbers");
+        let tests = PairTests { sampler: 0, pairs: pairs.into_iter().map(|c| (c, Some(0.0), None)).collect() };
+        let words = pair_words(&tests).expect("a pair");
+        assert!(tests.largest_mean().is_some_and(|(c, ..)| c.rho.value > 1.0), "else there is nothing to say");
+        assert!(words.contains(" in units of 1/12"), "{words}");
     }
 
     fn set_cell_has_number(t: &SetTests) -> bool {

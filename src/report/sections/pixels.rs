@@ -47,6 +47,11 @@ fn tested(summary: &Summary, spp: u32) -> Vec<Tested<'_>> {
     all
 }
 
+/// Whether [`spectra`] has something to show.
+pub fn are_there(summary: &Summary) -> bool {
+    pattern_spp(summary).is_some_and(|spp| !tested(summary, spp).is_empty())
+}
+
 /// Spectra of the error images: a figure, a test of each, a table.
 pub fn spectra(summary: &Summary, figures: &Figures, page: &mut Page) {
     let Some(spp) = pattern_spp(summary) else { return };

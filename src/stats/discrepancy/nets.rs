@@ -126,12 +126,30 @@ fn is_even(axes: &[&[f64]], shape: &[u32], bits: u32, counts: &mut [u32]) -> boo
 /// in a scattered order: O(n) expected for any set (Rabin 1976; Golin et al. 1995).
 /// In the plane, dividing by √(2/(√3 n)) gives the share of the densest packing's distance.
 pub fn min_toroidal_distance(points: &Points) -> Option<f64> {
+    if points.n() < 2 {
+        return None;
+    }
+    let squared = nearest_squared(points, 1.0);
+    if squared >= SMALLEST_SQUARE {
+        return Some(squared.sqrt());
+    }
+    // In units that fit: equal points have 0 there, too, and what is then infinite is no nearest pair.
+    Some(nearest_squared(points, TINY_UNITS).sqrt() / TINY_UNITS)
+}
+
+/// Squares below this have lost digits, or are 0 though the points differ: normal numbers end at 2^−1022.
+const SMALLEST_SQUARE: f64 = 1e-280;
+
+/// 2^600: the smallest number of f64, 2^−1074, has a square in these units, as has the root of [`SMALLEST_SQUARE`].
+const TINY_UNITS: f64 = f64::from_bits((1023 + 600) << 52);
+
+/// Smallest squared distance of at least two points, distances being multiplied by `scale`.
+fn nearest_squared(points: &Points, scale: f64) -> f64 {
     match points.dimension() {
-        _ if points.n() < 2 => None,
-        1 => Some(nearest_by_sweep(points, ENOUGH).unwrap_or_else(|| nearest_by_grid::<1>(points)).sqrt()),
-        2 => Some(nearest_by_sweep(points, ENOUGH).unwrap_or_else(|| nearest_by_grid::<2>(points)).sqrt()),
-        3 => Some(nearest_by_sweep(points, ENOUGH).unwrap_or_else(|| nearest_by_grid::<3>(points)).sqrt()),
-        _ => nearest_by_sweep(points, usize::MAX).map(f64::sqrt),
+        1 => nearest_by_sweep(points, scale, ENOUGH).unwrap_or_else(|| nearest_by_grid::<1>(points, scale)),
+        2 => nearest_by_sweep(points, scale, ENOUGH).unwrap_or_else(|| nearest_by_grid::<2>(points, scale)),
+        3 => nearest_by_sweep(points, scale, ENOUGH).unwrap_or_else(|| nearest_by_grid::<3>(points, scale)),
+        _ => nearest_by_sweep(points, scale, usize::MAX).unwrap_or(0.0),
     }
 }
 
@@ -163,14 +181,14 @@ impl CellGrid {
     }
 
     /// As many cells as the squared distance allows: a percent wider than it, so that no rounding parts neighbours.
-    fn refine(&mut self, squared: f64) {
-        self.per_axis = ((0.99 / squared.sqrt()) as u64).clamp(1, 1 << 31);
+    fn refine(&mut self, squared: f64, scale: f64) {
+        self.per_axis = ((0.99 * scale / squared.sqrt()) as u64).clamp(1, 1 << 31);
         self.last.fill(u32::MAX);
     }
 }
 
-/// Smallest squared distance of at least two points in D dimensions.
-fn nearest_by_grid<const D: usize>(points: &Points) -> f64 {
+/// Smallest squared distance of at least two points in D dimensions, see [`nearest_squared`].
+fn nearest_by_grid<const D: usize>(points: &Points, scale: f64) -> f64 {
     let all: Vec<&[f64]> = points.iter().collect();
     let n = u32::try_from(all.len()).expect("fewer than 2^32 points");
     // Scattered by a fixed multiplication, so that no order of the points makes the grid be built too often.
@@ -197,7 +215,7 @@ fn nearest_by_grid<const D: usize>(points: &Points) -> f64 {
             });
             let mut other = grid.last[grid.place(around)];
             while other != u32::MAX {
-                nearest = nearest.min(squared_distance(p, all[other as usize]));
+                nearest = nearest.min(squared_distance(p, all[other as usize], scale));
                 other = grid.before[other as usize];
             }
         }
@@ -205,7 +223,7 @@ fn nearest_by_grid<const D: usize>(points: &Points) -> f64 {
             return 0.0;
         }
         if nearest < before {
-            grid.refine(nearest);
+            grid.refine(nearest, scale);
             order[..=entered].iter().for_each(|&j| grid.enter::<D>(j, all[j as usize]));
         } else {
             grid.enter::<D>(i, p);
@@ -216,7 +234,7 @@ fn nearest_by_grid<const D: usize>(points: &Points) -> f64 {
 
 /// Smallest squared distance of at least two points: points are compared only while one coordinate alone is closer than
 /// the best pair so far. `None` where that takes more than so many pairs a point.
-fn nearest_by_sweep(points: &Points, pairs_a_point: usize) -> Option<f64> {
+fn nearest_by_sweep(points: &Points, scale: f64, pairs_a_point: usize) -> Option<f64> {
     let distinct = |axis: &usize| {
         let mut values = points.axis(*axis);
         values.sort_by(f64::total_cmp);
@@ -232,17 +250,18 @@ fn nearest_by_sweep(points: &Points, pairs_a_point: usize) -> Option<f64> {
     for (i, from) in sorted.iter().enumerate() {
         for step in 1..n {
             let to = sorted[(i + step) % n];
-            let ahead = if i + step < n { to[axis] - from[axis] } else { to[axis] - from[axis] + 1.0 };
+            let ahead = if i + step < n { to[axis] - from[axis] } else { (1.0 - from[axis]) + to[axis] };
             // A pair more than half a turn ahead is met from its other end. The comparison with the squared best is
             // padded by a rounding, so that no equal distance is lost to it.
-            if ahead > 0.5 || ahead * ahead > nearest * (1.0 + 4.0 * f64::EPSILON) {
+            let scaled = ahead * scale;
+            if ahead > 0.5 || scaled * scaled > nearest * (1.0 + 4.0 * f64::EPSILON) {
                 break;
             }
             if left == 0 {
                 return None;
             }
             left -= 1;
-            nearest = nearest.min(squared_distance(from, to));
+            nearest = nearest.min(squared_distance(from, to, scale));
         }
         if nearest == 0.0 {
             break;
@@ -251,11 +270,12 @@ fn nearest_by_sweep(points: &Points, pairs_a_point: usize) -> Option<f64> {
     Some(nearest)
 }
 
-/// Squared Euclidean distance on the torus.
-fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
+/// Squared Euclidean distance on the torus, the distance being multiplied by `scale`.
+fn squared_distance(a: &[f64], b: &[f64], scale: f64) -> f64 {
     let along = |(a, b): (&f64, &f64)| {
-        let t = (a - b).abs();
-        let t = t.min(1.0 - t);
+        // Around the border as (1 − larger) + smaller: 1 − (larger − smaller) would lose a tiny smaller one.
+        let (smaller, larger) = (a.min(*b), a.max(*b));
+        let t = (larger - smaller).min((1.0 - larger) + smaller) * scale;
         t * t
     };
     a.iter().zip(b).map(along).sum()
@@ -367,11 +387,11 @@ mod tests {
                 let set: Vec<&[f64]> = set.iter().map(|p| &p[..d]).collect();
                 let points = Points::new(d, set.concat()).expect("valid");
                 let pairs = (0..set.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
-                let twin = pairs.map(|(i, j)| squared_distance(set[i], set[j])).fold(f64::INFINITY, f64::min);
+                let twin = pairs.map(|(i, j)| squared_distance(set[i], set[j], 1.0)).fold(f64::INFINITY, f64::min);
                 prop_assert_eq!(min_toroidal_distance(&points), Some(twin.sqrt()));
                 let by_grid = [nearest_by_grid::<1>, nearest_by_grid::<2>, nearest_by_grid::<3>];
                 if let Some(by_grid) = by_grid.get(d - 1) {
-                    prop_assert_eq!(by_grid(&points), twin);
+                    prop_assert_eq!(by_grid(&points, 1.0), twin);
                 }
                 Ok(())
             })
@@ -384,7 +404,7 @@ mod tests {
         let mut set: Vec<[f64; 2]> =
             (0..3000).map(|i| [0.3 + 1e-9 * f64::from(i % 50), 0.6 + 1e-9 * f64::from(i / 50)]).collect();
         assert!((min_toroidal_distance(&plane(&set)).expect("many") - 1e-9).abs() < 1e-15);
-        assert!((nearest_by_grid::<2>(&plane(&set)).sqrt() - 1e-9).abs() < 1e-15);
+        assert!((nearest_by_grid::<2>(&plane(&set), 1.0).sqrt() - 1e-9).abs() < 1e-15);
         set.extend([[0.5, 0.5], [0.5 + f64::EPSILON / 2.0, 0.5]]);
         assert_eq!(min_toroidal_distance(&plane(&set)), Some(f64::EPSILON / 2.0));
     }
@@ -418,5 +438,25 @@ mod tests {
         let grid: Vec<[f64; 2]> = (0..1600).map(|i| [f64::from(i % 40) / 40.0, f64::from(i / 40) / 40.0]).collect();
         let distance = min_toroidal_distance(&plane(&grid)).expect("many points");
         assert!((distance - 0.025).abs() < 1e-16 * 4.0);
+    }
+
+    #[test]
+    fn distances_whose_squares_leave_the_range_of_f64_are_no_duplicates() {
+        let smallest = f64::from_bits(1);
+        for (set, expected) in [
+            (vec![[0.0, 0.0], [0.0, smallest], [0.5, 0.5]], smallest),
+            (vec![[3e-200, 0.0], [0.0, 4e-200], [0.7, 0.2]], 5e-200),
+            (vec![[0.0, 1.0], [1.0, 1e-170], [0.3, 0.3]], 1e-170),
+            (vec![[1e-160, 0.5], [1e-160, 0.5], [2e-160, 0.5]], 0.0),
+        ] {
+            let points = plane(&set);
+            let grid = nearest_by_grid::<2>(&points, TINY_UNITS).sqrt() / TINY_UNITS;
+            for found in [min_toroidal_distance(&points).expect("three points"), grid] {
+                assert!((found - expected).abs() <= 4e-16 * expected, "{found:e}, expected {expected:e}");
+            }
+        }
+        let apart = Points::new(5, [[1e-250; 5], [2e-250; 5]].concat()).expect("in the cube");
+        let found = min_toroidal_distance(&apart).expect("two points");
+        assert!((found / (5.0_f64.sqrt() * 1e-250) - 1.0).abs() < 1e-15, "{found:e}");
     }
 }
