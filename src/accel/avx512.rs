@@ -8,13 +8,10 @@ use std::arch::x86_64::*;
 
 use super::Bounds;
 use super::build::{Accel, Slot};
-use super::packet::{LANES, NOTHING, Packet, Row};
+use super::packet::{LANES, NOTHING, Packet, Row, STACK};
 
 /// Octant of a packet whose rays differ in the sign of a coordinate.
 const MIXED: u8 = 8;
-
-/// Nodes waiting on the way down: one for each level of the tree, on the stack for all but degenerate trees.
-const STACK: usize = 96;
 
 /// Three coordinates of 16 vectors.
 #[derive(Clone, Copy)]
@@ -229,8 +226,7 @@ pub(super) fn trace<const ANY: bool>(accel: &Accel, packet: &mut Packet) {
     }
     let (limit, triangle) = packet.results();
     store(limit, rays.limit);
-    let ids: [u32; LANES] = triangles(rays.triangle);
-    *triangle = ids;
+    *triangle = triangles(rays.triangle);
 }
 
 #[inline]

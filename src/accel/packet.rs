@@ -205,7 +205,7 @@ impl<const ANY: bool> Wide for PortablePacket<'_, ANY> {
 }
 
 /// Nodes waiting on the way down: one for each level of the tree, on the stack for all but degenerate trees.
-const STACK: usize = 96;
+pub(super) const STACK: usize = 96;
 
 impl Accel {
     /// Finds, for every ray of the packet, the nearest hit below its limit.

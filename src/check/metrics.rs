@@ -204,7 +204,7 @@ fn l2_of_random_points(context: &Context) -> Finding {
     let family = context.family(27);
     let mut tally = Tally::new();
     for d in [1, 2, 4_usize] {
-        let sets: Vec<Points> = (0..u64::from(context.replicates(1500, 1000)))
+        let sets: Vec<Points> = (0..u64::from(context.replicates(2000, 2000)))
             .map(|r| {
                 let seed = context.seed_of(d as u64, r);
                 Points::new(d, (0..32 * d as u64).map(|i| unit(seed, i)).collect()).expect("in the unit cube")

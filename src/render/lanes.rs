@@ -164,7 +164,7 @@ impl Lanes {
             triangles[lane] = if hit[lane] { triangles[lane] } else { some };
         }
         self.surfaces.fill(&scene.faces, &triangles, &self.origin, &self.direction);
-        self.look_at_materials(scene, &triangles);
+        self.look_at_materials(scene, &triangles, &hit);
         let Some(lights) = &scene.lights else {
             for c in 0..3 {
                 for lane in 0..LANES {
@@ -206,11 +206,13 @@ impl Lanes {
 
     /// Looks up albedos, with their textures.
     #[inline(always)]
-    fn look_at_materials(&mut self, scene: &Scene, triangles: &[u32; LANES]) {
+    fn look_at_materials(&mut self, scene: &Scene, triangles: &[u32; LANES], hit: &[bool; LANES]) {
         for lane in 0..LANES {
             let material = &scene.mesh.materials[self.surfaces.material[lane] as usize];
             let albedo = match material.texture {
                 None => material.albedo,
+                // What a lane that met nothing stands in for needs no look-up.
+                Some(_) if !hit[lane] => material.albedo,
                 Some(texture) => {
                     let uv = self.surfaces.uv(&scene.faces[triangles[lane] as usize], lane);
                     material.albedo * scene.mesh.textures[texture as usize].sample(uv)

@@ -50,7 +50,7 @@ pub fn checks() -> Vec<Check> {
 fn disk_moments(context: &Context) -> Finding {
     let family = context.family(4);
     let points: Vec<Vec2> =
-        uniform_points(context.seed, context.replicates(100_000, 1_000)).map(square_to_disk).collect();
+        uniform_points(context.seed, context.replicates(100_000, 2_000)).map(square_to_disk).collect();
     let mut tally = Tally::new();
     let mut mean = |what: &str, f: fn(Vec2) -> f32, exact: f64| {
         let values: Vec<f64> = points.iter().map(|&p| f64::from(f(p))).collect();
@@ -109,7 +109,7 @@ fn confusion_moments(context: &Context) -> Finding {
     let family = context.family(2 * rows.len() as u32);
     let mut tally = Tally::new();
     for (part, row) in rows.iter().enumerate() {
-        let n = context.replicates(200_000, 1_000);
+        let n = context.replicates(200_000, 2_000);
         let radii: Vec<f64> =
             confusion(row, context.seed_of(part as u64, 0), n).iter().map(|p| f64::from(p.length())).collect();
         let (c, rounding) = (row.px, place_rounding(row));
@@ -130,7 +130,7 @@ fn chief_ray(context: &Context) -> Finding {
     let family = context.family(2 * rows.len() as u32);
     let mut tally = Tally::new();
     for (part, row) in rows.iter().enumerate() {
-        let points = confusion(row, context.seed_of(part as u64, 0), context.replicates(200_000, 1_000));
+        let points = confusion(row, context.seed_of(part as u64, 0), context.replicates(200_000, 2_000));
         for (axis, name) in ["x", "y"].into_iter().enumerate() {
             let offsets: Vec<f64> = points.iter().map(|p| f64::from(p[axis])).collect();
             let verdict = t_test(&offsets, 0.0, family);

@@ -171,7 +171,7 @@ fn mean_of(context: &Context, settings: &[Setting]) -> Finding {
     let family = context.family(settings.len() as u32);
     let mut tally = Tally::new();
     for (part, setting) in settings.iter().enumerate() {
-        let samples = setting.received(context.replicates(SAMPLES, 1_000), context.seed_of(part as u64, 0));
+        let samples = setting.received(context.replicates(SAMPLES, 2_000), context.seed_of(part as u64, 0));
         let exact = setting.exact();
         tally.verdict(&setting.name, &exact.test(&samples, family), exact.value);
     }
@@ -184,7 +184,7 @@ fn variance_of(context: &Context, settings: &[Setting]) -> Finding {
     let family = context.family(settings.len() as u32);
     let mut tally = Tally::new();
     for (part, setting) in settings.iter().enumerate() {
-        let samples = setting.received(context.replicates(2 * SAMPLES, 1_000), context.seed_of(part as u64, 1));
+        let samples = setting.received(context.replicates(2 * SAMPLES, 2_000), context.seed_of(part as u64, 1));
         let (mean, variance) = (setting.exact().value, setting.variance());
         let squares: Vec<f64> = samples.iter().map(|s| (s - mean).powi(2)).collect();
         tally.verdict(&setting.name, &t_test_of_squares(&squares, variance, family), variance);
@@ -221,7 +221,7 @@ fn mean_alone_is_blind(context: &Context) -> Finding {
     let setting = &quads()[0];
     let from = setting.surface();
     let wrong = |u: Vec2| 2.0 * f64::from(u.x) * contribution(&setting.light, Vec2::new(u.x * u.x, u.y), &from);
-    let samples: Vec<f64> = uniform_points(context.seed, context.replicates(SAMPLES, 1_000)).map(wrong).collect();
+    let samples: Vec<f64> = uniform_points(context.seed, context.replicates(SAMPLES, 2_000)).map(wrong).collect();
     let (exact, variance) = (setting.exact(), setting.variance());
     let squares: Vec<f64> = samples.iter().map(|s| (s - exact.value).powi(2)).collect();
     let (mean, spread) = (exact.test(&samples, family), t_test_of_squares(&squares, variance, family));

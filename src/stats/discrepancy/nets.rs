@@ -129,12 +129,14 @@ pub fn min_toroidal_distance(points: &Points) -> Option<f64> {
     if points.n() < 2 {
         return None;
     }
-    let squared = nearest_squared(points, 1.0);
+    let squared = nearest_squared(points, 1.0, f64::INFINITY);
     if squared >= SMALLEST_SQUARE {
         return Some(squared.sqrt());
     }
-    // In units that fit: equal points have 0 there, too, and what is then infinite is no nearest pair.
-    Some(nearest_squared(points, TINY_UNITS).sqrt() / TINY_UNITS)
+    // In units that fit: equal points have 0 there, too, and what is then infinite is no nearest pair. The nearest lies below
+    // the bound that has just been passed, so nothing farther need be looked at.
+    let bound = 2.0 * SMALLEST_SQUARE * TINY_UNITS * TINY_UNITS;
+    Some(nearest_squared(points, TINY_UNITS, bound).sqrt() / TINY_UNITS)
 }
 
 /// Squares below this have lost digits, or are 0 though the points differ: normal numbers end at 2^−1022.
@@ -143,13 +145,19 @@ const SMALLEST_SQUARE: f64 = 1e-280;
 /// 2^600: the smallest number of f64, 2^−1074, has a square in these units, as has the root of [`SMALLEST_SQUARE`].
 const TINY_UNITS: f64 = f64::from_bits((1023 + 600) << 52);
 
-/// Smallest squared distance of at least two points, distances being multiplied by `scale`.
-fn nearest_squared(points: &Points, scale: f64) -> f64 {
+/// Smallest squared distance of at least two points, distances being multiplied by `scale`; `bound` where none is below it.
+fn nearest_squared(points: &Points, scale: f64, bound: f64) -> f64 {
     match points.dimension() {
-        1 => nearest_by_sweep(points, scale, ENOUGH).unwrap_or_else(|| nearest_by_grid::<1>(points, scale)),
-        2 => nearest_by_sweep(points, scale, ENOUGH).unwrap_or_else(|| nearest_by_grid::<2>(points, scale)),
-        3 => nearest_by_sweep(points, scale, ENOUGH).unwrap_or_else(|| nearest_by_grid::<3>(points, scale)),
-        _ => nearest_by_sweep(points, scale, usize::MAX).unwrap_or(0.0),
+        1 => {
+            nearest_by_sweep(points, scale, bound, ENOUGH).unwrap_or_else(|| nearest_by_grid::<1>(points, scale, bound))
+        }
+        2 => {
+            nearest_by_sweep(points, scale, bound, ENOUGH).unwrap_or_else(|| nearest_by_grid::<2>(points, scale, bound))
+        }
+        3 => {
+            nearest_by_sweep(points, scale, bound, ENOUGH).unwrap_or_else(|| nearest_by_grid::<3>(points, scale, bound))
+        }
+        _ => nearest_by_sweep(points, scale, bound, usize::MAX).unwrap_or(0.0),
     }
 }
 
@@ -188,7 +196,7 @@ impl CellGrid {
 }
 
 /// Smallest squared distance of at least two points in D dimensions, see [`nearest_squared`].
-fn nearest_by_grid<const D: usize>(points: &Points, scale: f64) -> f64 {
+fn nearest_by_grid<const D: usize>(points: &Points, scale: f64, bound: f64) -> f64 {
     let all: Vec<&[f64]> = points.iter().collect();
     let n = u32::try_from(all.len()).expect("fewer than 2^32 points");
     // Scattered by a fixed multiplication, so that no order of the points makes the grid be built too often.
@@ -201,7 +209,8 @@ fn nearest_by_grid<const D: usize>(points: &Points, scale: f64) -> f64 {
         last: vec![u32::MAX; (2 * all.len()).next_power_of_two()],
         before: vec![u32::MAX; all.len()],
     };
-    let mut nearest = f64::INFINITY;
+    let mut nearest = bound;
+    grid.refine(bound, scale);
     for (entered, &i) in order.iter().enumerate() {
         let p = all[i as usize];
         let before = nearest;
@@ -234,7 +243,7 @@ fn nearest_by_grid<const D: usize>(points: &Points, scale: f64) -> f64 {
 
 /// Smallest squared distance of at least two points: points are compared only while one coordinate alone is closer than
 /// the best pair so far. `None` where that takes more than so many pairs a point.
-fn nearest_by_sweep(points: &Points, scale: f64, pairs_a_point: usize) -> Option<f64> {
+fn nearest_by_sweep(points: &Points, scale: f64, bound: f64, pairs_a_point: usize) -> Option<f64> {
     let distinct = |axis: &usize| {
         let mut values = points.axis(*axis);
         values.sort_by(f64::total_cmp);
@@ -245,7 +254,7 @@ fn nearest_by_sweep(points: &Points, scale: f64, pairs_a_point: usize) -> Option
     let mut sorted: Vec<&[f64]> = points.iter().collect();
     sorted.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
     let n = sorted.len();
-    let mut nearest = f64::INFINITY;
+    let mut nearest = bound;
     let mut left = n.saturating_mul(pairs_a_point);
     for (i, from) in sorted.iter().enumerate() {
         for step in 1..n {
@@ -391,7 +400,7 @@ mod tests {
                 prop_assert_eq!(min_toroidal_distance(&points), Some(twin.sqrt()));
                 let by_grid = [nearest_by_grid::<1>, nearest_by_grid::<2>, nearest_by_grid::<3>];
                 if let Some(by_grid) = by_grid.get(d - 1) {
-                    prop_assert_eq!(by_grid(&points, 1.0), twin);
+                    prop_assert_eq!(by_grid(&points, 1.0, f64::INFINITY), twin);
                 }
                 Ok(())
             })
@@ -404,7 +413,7 @@ mod tests {
         let mut set: Vec<[f64; 2]> =
             (0..3000).map(|i| [0.3 + 1e-9 * f64::from(i % 50), 0.6 + 1e-9 * f64::from(i / 50)]).collect();
         assert!((min_toroidal_distance(&plane(&set)).expect("many") - 1e-9).abs() < 1e-15);
-        assert!((nearest_by_grid::<2>(&plane(&set), 1.0).sqrt() - 1e-9).abs() < 1e-15);
+        assert!((nearest_by_grid::<2>(&plane(&set), 1.0, f64::INFINITY).sqrt() - 1e-9).abs() < 1e-15);
         set.extend([[0.5, 0.5], [0.5 + f64::EPSILON / 2.0, 0.5]]);
         assert_eq!(min_toroidal_distance(&plane(&set)), Some(f64::EPSILON / 2.0));
     }
@@ -450,10 +459,20 @@ mod tests {
             (vec![[1e-160, 0.5], [1e-160, 0.5], [2e-160, 0.5]], 0.0),
         ] {
             let points = plane(&set);
-            let grid = nearest_by_grid::<2>(&points, TINY_UNITS).sqrt() / TINY_UNITS;
+            let grid = nearest_by_grid::<2>(&points, TINY_UNITS, f64::INFINITY).sqrt() / TINY_UNITS;
             for found in [min_toroidal_distance(&points).expect("three points"), grid] {
                 assert!((found - expected).abs() <= 4e-16 * expected, "{found:e}, expected {expected:e}");
             }
+        }
+        // One late duplicate among many points costs no more than none: pairs are looked at only below the bound.
+        for d in [2, 5] {
+            let mut set: Vec<f64> =
+                (0..40_000 * d as u64).map(|i| crate::sampling::hash::bits64(5, i) as f64 * 2f64.powi(-64)).collect();
+            set.extend_from_within(7 * d..8 * d);
+            let points = Points::new(d, set).expect("in the cube");
+            assert_eq!(min_toroidal_distance(&points), Some(0.0));
+            let bound = 2.0 * SMALLEST_SQUARE * TINY_UNITS * TINY_UNITS;
+            assert_eq!(nearest_by_sweep(&points, TINY_UNITS, bound, 1), Some(0.0), "more than one pair a point");
         }
         let apart = Points::new(5, [[1e-250; 5], [2e-250; 5]].concat()).expect("in the cube");
         let found = min_toroidal_distance(&apart).expect("two points");

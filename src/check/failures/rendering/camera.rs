@@ -78,7 +78,7 @@ fn without_root(u: Vec2) -> Vec2 {
 fn lens_without_root(context: &Context) -> Finding {
     let family = context.family(2);
     let radii = |map: fn(Vec2) -> Vec2| -> Vec<f64> {
-        let n = context.replicates(50_000, 1_000);
+        let n = context.replicates(50_000, 2_000);
         uniform_points(context.seed, n).map(|u| f64::from(map(u).length())).collect()
     };
     let (ours, wrong) = (radii(square_to_disk), radii(without_root));

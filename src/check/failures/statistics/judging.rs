@@ -217,7 +217,7 @@ fn planned(sampler: &str, seed: u64) -> WorkItem {
 /// n samples of N that the reference is made of: the expected squared error falls from σ²(1/n + 1/N) to σ²(1/n − 1/N).
 fn shared_seeds(context: &Context) -> Finding {
     let (n, all) = (16, 64);
-    let pixels = context.replicates(4_000, 1_000);
+    let pixels = context.replicates(4_000, 2_000);
     let mut draws = Draws::new(context, 0);
     let mean = |v: &[f64]| sum(v.iter().copied()) / v.len() as f64;
     let (mut shared, mut apart) = (Vec::new(), Vec::new());
@@ -261,7 +261,7 @@ fn within_a_net(context: &Context) -> Finding {
         Ok(owen) => owen,
         Err(what) => return Finding::broken(what),
     };
-    let (n, replicates) = (64_u32, context.replicates(4_000, 1_000));
+    let (n, replicates) = (64_u32, context.replicates(4_000, 2_000));
     let (mut naive, mut squares, mut estimates) = (Vec::new(), Vec::new(), Vec::new());
     for r in 0..replicates {
         let Ok(points) = point_set(owen, n, context.seed_of(0, u64::from(r))) else {
@@ -366,7 +366,7 @@ fn l2_star_squares(context: &Context, sampler: &str, n: u32, replicates: u32) ->
 fn mean_of_roots(context: &Context) -> Finding {
     let (n, few) = (64_u32, 16_u32);
     let count = context.replicates(8_000, 6_000);
-    let nets = l2_star_squares(context, "ld:shuffle:owen@each", n, context.replicates(2_000, 1_000));
+    let nets = l2_star_squares(context, "ld:shuffle:owen@each", n, context.replicates(2_000, 2_000));
     let (nets, random) = match (nets, l2_star_squares(context, "uniform", few, count)) {
         (Ok(nets), Ok(random)) => (nets, random),
         (Err(what), _) | (_, Err(what)) => return Finding::broken(what),
