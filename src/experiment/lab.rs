@@ -23,7 +23,7 @@ use crate::stats::discrepancy::{L2Kind, Points, l2_root, min_toroidal_distance, 
 use crate::stats::pixel_variance::Integrand;
 
 /// Raised whenever the bits of image errors or point-set metrics may change.
-pub const METRICS_ALGORITHM: u32 = 2;
+pub const METRICS_ALGORITHM: u32 = 3;
 
 /// Raised whenever the weighting of lights changes.
 pub const ESTIMATOR_ALGORITHM: u32 = 1;
