@@ -490,7 +490,7 @@ fn a_bad_point_file_is_refused_with_its_line() {
     let folder = Folder::new(&[("points.csv", "0.5,0.5\n")]);
     folder.refuses(&["measure", "points.csv", "-n", "3"], 2, &["-n: expected no count with a file", "found 3"]);
     std::fs::write(folder.path("points.csv"), [0xff, 0xfe, b'0']).unwrap();
-    folder.refuses(&["measure", "points.csv"], 2, &["points.csv: expected a readable CSV file", "found"]);
+    folder.refuses(&["measure", "points.csv"], 2, &["points.csv: line 1: expected UTF-8 text", "found other bytes"]);
 }
 
 /// The keys of a `measure` document that hold a root and its square.
