@@ -348,9 +348,9 @@ fn folders_that_do_not_belong_together_are_not_merged() {
         ("experiment.json", "\"content_hash\": \"", "\"content_hash\": \"0", &["another scene: cornell with content"]),
         (
             "experiment.json",
-            "\"metrics\": 2",
             "\"metrics\": 3",
-            &["another algorithm number of the metrics: 2 there, 3 here"],
+            "\"metrics\": 4",
+            &["another algorithm number of the metrics: 3 there, 4 here"],
         ),
     ] {
         edited("b", file, from, to);
@@ -358,8 +358,8 @@ fn folders_that_do_not_belong_together_are_not_merged() {
         desk.lab(&["merge", "b", "a", "--out", "m"]).with(2, &[]);
         assert!(!desk.path("m").exists(), "a folder for nothing is left");
     }
-    edited("b", "experiment.json", "\"metrics\": 2", "\"metrics\": 9");
-    desk.lab(&["merge", "b", "--out", "m"]).with(2, &["found 9 for the metrics, which is 2 here"]);
+    edited("b", "experiment.json", "\"metrics\": 3", "\"metrics\": 9");
+    desk.lab(&["merge", "b", "--out", "m"]).with(2, &["found 9 for the metrics, which is 3 here"]);
     desk.lab(&["merge", "nowhere", "--out", "m"]).with(2, &["nowhere"]);
     for (shard, parts) in [("0/2", "expected I/N with 1 ≤ I ≤ N"), ("3/2", "found \"3/2\""), ("2", "such as 2/3")] {
         desk.run("c", &["--shard", shard]).with(2, &["--shard", parts]);
