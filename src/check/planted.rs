@@ -80,7 +80,7 @@ pub fn markdown(rows: &[Row], checks: usize, settings: &Settings) -> String {
          which is on at a time. Each is tried on all {checks} checks at their usual numbers (effort 1, seed {}, false alarms \
          {:e} for a run of all), and on its cheapest check at less effort: a number of replicates in proportion, never \
          below the least that a check asks for. n is the most replicates (seeds, pixels, sets, samples) in one of its tests when it was caught; \
-         a check without a number is exact. {}\n\n\
+         a check without a number is exact, or its numbers are fixed. {}\n\n\
          `check --mutants` tries each on its cheapest check (CI does), `check --mutant NAME` on all of them.\n\n\
          | planted bug | where | what is done wrong | cheapest check | n | what it said | caught by (n) |\n\
          |---|---|---|---|---|---|---|\n",
