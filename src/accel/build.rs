@@ -1,5 +1,7 @@
 //! The tree: built by obvhs, stored as pairs of boxes.
 
+use std::sync::OnceLock;
+
 use glam::Vec3;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -7,6 +9,7 @@ use obvhs::bvh2::leaf_collapser::collapse;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
+use super::packet_tree::PacketTree;
 use super::{Bounds, Kernel, Triangle, box_padding};
 
 /// Most triangles in a leaf; a leaf's count is stored in 3 bits.
@@ -65,6 +68,9 @@ pub struct Accel {
     /// Levels below the root, which bounds a traversal's stack.
     pub(super) depth: usize,
     pub(super) kernel: Kernel,
+    /// How much wider than its triangle a box is.
+    pub(super) pad: f32,
+    packets: OnceLock<PacketTree>,
 }
 
 impl Accel {
@@ -80,6 +86,8 @@ impl Accel {
             slots: Vec::with_capacity(triangles.len()),
             depth: 0,
             kernel: Kernel::detected(),
+            pad,
+            packets: OnceLock::new(),
         };
         if triangles.is_empty() {
             return accel;
@@ -90,6 +98,11 @@ impl Accel {
             Slot { corners: triangle.corners, bounds: triangle.bounds(pad), id: index }
         };
         accel.copy(&tree, &place);
+        drop(tree);
+        #[cfg(target_arch = "x86_64")]
+        if accel.kernel == Kernel::Avx512 {
+            accel.packet_tree();
+        }
         accel
     }
 
@@ -107,9 +120,17 @@ impl Accel {
         self.kernel = kernel;
     }
 
-    /// Bytes that tree and triangles take.
+    /// Bytes that trees and triangles take.
     pub fn bytes(&self) -> usize {
-        self.nodes.len() * size_of::<Node>() + self.slots.len() * size_of::<Slot>()
+        let packets = self.packets.get().map_or(0, PacketTree::bytes);
+        size_of_val(self.nodes.as_slice()) + size_of_val(self.slots.as_slice()) + packets
+    }
+
+    /// The tree for packets in wide registers: made at once where the processor has these, else when it is first asked for.
+    #[cfg(target_arch = "x86_64")]
+    #[inline]
+    pub(super) fn packet_tree(&self) -> &PacketTree {
+        self.packets.get_or_init(|| PacketTree::new(self))
     }
 
     /// Copies obvhs' tree, depth first, so that a node's first child follows it.

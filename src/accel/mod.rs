@@ -10,8 +10,11 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+#[cfg(target_arch = "x86_64")]
+mod beam;
 mod build;
 mod packet;
+mod packet_tree;
 mod wide;
 
 use glam::Vec3;
