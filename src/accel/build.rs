@@ -1,5 +1,7 @@
 //! The tree: built by obvhs, stored as pairs of boxes.
 
+use std::sync::OnceLock;
+
 use glam::Vec3;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -7,6 +9,7 @@ use obvhs::bvh2::leaf_collapser::collapse;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
+use super::nodes8::Tree8;
 use super::{Bounds, Kernel, Triangle, box_padding};
 
 /// Most triangles in a leaf; a leaf's count is stored in 3 bits.
@@ -65,6 +68,8 @@ pub struct Accel {
     /// Levels below the root, which bounds a traversal's stack.
     pub(super) depth: usize,
     pub(super) kernel: Kernel,
+    pad: f32,
+    single: OnceLock<Tree8>,
 }
 
 impl Accel {
@@ -80,6 +85,8 @@ impl Accel {
             slots: Vec::with_capacity(triangles.len()),
             depth: 0,
             kernel: Kernel::detected(),
+            pad,
+            single: OnceLock::new(),
         };
         if triangles.is_empty() {
             return accel;
@@ -107,9 +114,16 @@ impl Accel {
         self.kernel = kernel;
     }
 
-    /// Bytes that tree and triangles take.
+    /// Bytes that tree and triangles take; those for single rays from when one was asked for.
     pub fn bytes(&self) -> usize {
-        self.nodes.len() * size_of::<Node>() + self.slots.len() * size_of::<Slot>()
+        let single = self.single.get().map_or(0, Tree8::bytes);
+        self.nodes.len() * size_of::<Node>() + self.slots.len() * size_of::<Slot>() + single
+    }
+
+    /// The tree for single rays: made when first asked for, since pictures are rendered without one.
+    #[inline(always)]
+    pub(super) fn single_rays(&self) -> &Tree8 {
+        self.single.get_or_init(|| Tree8::new(self, self.pad))
     }
 
     /// Copies obvhs' tree, depth first, so that a node's first child follows it.
