@@ -10,7 +10,7 @@ use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 use super::nodes8::Tree8;
-use super::{Bounds, Kernel, Triangle, box_padding};
+use super::{Bounds, Kernel, Triangle, box_padding, pages};
 
 /// Most triangles in a leaf; a leaf's count is stored in 3 bits.
 const LEAF_TRIANGLES: u32 = 8;
@@ -82,7 +82,7 @@ impl Accel {
         let pad = box_padding(reach);
         let mut accel = Self {
             nodes: Vec::new(),
-            slots: Vec::with_capacity(triangles.len()),
+            slots: pages::with_capacity(triangles.len()),
             depth: 0,
             kernel: Kernel::detected(),
             pad,
@@ -140,6 +140,8 @@ impl Accel {
             self.depth = 1;
             return;
         }
+        // Two boxes a node, of all but the root.
+        self.nodes = pages::with_capacity(tree.nodes.len() / 2);
         // (obvhs node, our parent and side, level)
         let mut open = vec![(0usize, None::<(usize, usize)>, 1usize)];
         while let Some((n, parent, level)) = open.pop() {
