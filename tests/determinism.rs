@@ -2,7 +2,7 @@
 //! the next change.
 
 use glam::Vec3;
-use sampler_lab::accel;
+use sampler_lab::accel::{self, Kernel};
 use sampler_lab::check::room::{Room, ceiling, looking_at, spec};
 use sampler_lab::film::Image;
 use sampler_lab::render::{self, render, render_sample};
@@ -53,6 +53,29 @@ fn one_two_and_seven_threads_give_the_same_bytes_for_every_sampler() {
         lit += one.iter().filter(|&&b| b != 0).count();
     }
     assert!(lit > 1000, "the images are not black");
+}
+
+/// Those that this processor has. Counts that fill no packet.
+#[test]
+fn every_kernel_gives_the_same_bytes_on_one_thread_and_on_two() {
+    let pools = [1, 2].map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap());
+    for stage in Stage::ALL {
+        let mut scene = scene(stage);
+        let names: &[&str] = if stage == Stage::Start { &["center"] } else { &["uniform", "sobol", "halton", "ld"] };
+        for name in names {
+            let sampler = Sampler::new(spec(name), &scene.layout, 21, 7).unwrap();
+            let mut images = Vec::new();
+            for kernel in Kernel::available() {
+                scene.accel.set_kernel(kernel);
+                images.extend(pools.iter().map(|pool| (kernel, pool.install(|| bits(&image(&scene, &sampler))))));
+            }
+            let first = &images[0].1;
+            assert!(first.iter().any(|&b| b != 0), "{stage:?}, {name}: black");
+            for (kernel, found) in &images {
+                assert!(found == first, "{stage:?}, {name}: {kernel} gives other bits than {}", images[0].0);
+            }
+        }
+    }
 }
 
 /// A pixel is the f64 sum of its samples in the order of their indices, over their count, rounded once.

@@ -9,8 +9,9 @@ use obvhs::bvh2::leaf_collapser::collapse;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
+use super::nodes8::Tree8;
 use super::packet_tree::PacketTree;
-use super::{Bounds, Kernel, Triangle, box_padding};
+use super::{Bounds, Kernel, Triangle, box_padding, pages};
 
 /// Most triangles in a leaf; a leaf's count is stored in 3 bits.
 const LEAF_TRIANGLES: u32 = 8;
@@ -71,6 +72,7 @@ pub struct Accel {
     /// How much wider than its triangle a box is.
     pub(super) pad: f32,
     packets: OnceLock<PacketTree>,
+    single: OnceLock<Tree8>,
 }
 
 impl Accel {
@@ -83,11 +85,12 @@ impl Accel {
         let pad = box_padding(reach);
         let mut accel = Self {
             nodes: Vec::new(),
-            slots: Vec::with_capacity(triangles.len()),
+            slots: pages::with_capacity(triangles.len()),
             depth: 0,
             kernel: Kernel::detected(),
             pad,
             packets: OnceLock::new(),
+            single: OnceLock::new(),
         };
         if triangles.is_empty() {
             return accel;
@@ -120,10 +123,11 @@ impl Accel {
         self.kernel = kernel;
     }
 
-    /// Bytes that trees and triangles take.
+    /// Bytes that trees and triangles take; those for single rays from when one was asked for.
     pub fn bytes(&self) -> usize {
         let packets = self.packets.get().map_or(0, PacketTree::bytes);
-        size_of_val(self.nodes.as_slice()) + size_of_val(self.slots.as_slice()) + packets
+        let single = self.single.get().map_or(0, Tree8::bytes);
+        size_of_val(self.nodes.as_slice()) + size_of_val(self.slots.as_slice()) + packets + single
     }
 
     /// The tree for packets in wide registers: made at once where the processor has these, else when it is first asked for.
@@ -131,6 +135,12 @@ impl Accel {
     #[inline]
     pub(super) fn packet_tree(&self) -> &PacketTree {
         self.packets.get_or_init(|| PacketTree::new(self))
+    }
+
+    /// The tree for single rays: made when first asked for, since pictures are rendered without one.
+    #[inline(always)]
+    pub(super) fn single_rays(&self) -> &Tree8 {
+        self.single.get_or_init(|| Tree8::new(self, self.pad))
     }
 
     /// Copies obvhs' tree, depth first, so that a node's first child follows it.
@@ -147,6 +157,8 @@ impl Accel {
             self.depth = 1;
             return;
         }
+        // Two boxes a node, of all but the root.
+        self.nodes = pages::with_capacity(tree.nodes.len() / 2);
         // (obvhs node, our parent and side, level)
         let mut open = vec![(0usize, None::<(usize, usize)>, 1usize)];
         while let Some((n, parent, level)) = open.pop() {

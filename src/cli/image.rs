@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use sampler_lab::accel::Kernel;
 use sampler_lab::error::{Error, Result};
 use sampler_lab::experiment::backend::Size;
 use sampler_lab::film::{check_writable, write_exr, write_png};
@@ -41,6 +42,9 @@ pub struct Render {
     /// Stage of the sheet's Figure 1: start, aa, dof, final
     #[arg(long, default_value = "final")]
     stage: String,
+    /// Instructions that trace the rays: scalar, avx2, avx512; all give the same image [default: the widest here]
+    #[arg(long, value_name = "NAME")]
+    kernel: Option<String>,
     /// Seed of the randomisation
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -69,6 +73,8 @@ impl Render {
             })
             .transpose()?;
         let size = self.size.as_deref().map(|s| Size::parse(s).map_err(|e| Error::input("--size", e))).transpose()?;
+        let kernel =
+            self.kernel.as_deref().map(|k| Kernel::parse(k).map_err(|e| Error::input("--kernel", e))).transpose()?;
         let out = self
             .out
             .clone()
@@ -83,7 +89,8 @@ impl Render {
         loaded.config.estimator = estimator.unwrap_or(loaded.config.estimator);
         let size = size.unwrap_or(Size { width: framebuffer.res_w, height: framebuffer.res_h });
         let started = Instant::now();
-        let scene = Scene::new(&loaded.config, loaded.mesh, (size.width, size.height), stage)?;
+        let mut scene = Scene::new(&loaded.config, loaded.mesh, (size.width, size.height), stage)?;
+        scene.accel.set_kernel(kernel.unwrap_or(Kernel::detected()));
         let build_seconds = started.elapsed().as_secs_f64();
         self.work.warn(&loaded.warnings);
         self.work.warn(&scene.warnings);
@@ -155,6 +162,7 @@ impl Render {
                 "spp": {"asked": asked, "taken": sampler.samples()},
                 "size": size.to_string(),
                 "seed": self.seed,
+                "kernel": scene.accel.kernel().name(),
                 "focal_depth": scene.focal_depth(),
                 "render_seconds": render_seconds,
                 "load_seconds": load_seconds,
