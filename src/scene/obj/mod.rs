@@ -132,7 +132,7 @@ struct Joiner<'a, L> {
     obj: Obj,
     by_name: HashMap<String, usize>,
     material: Option<usize>,
-    first_face: Option<usize>,
+    has_faces: bool,
     left_out: Vec<LeftOut>,
     open_library: L,
 }
@@ -147,18 +147,15 @@ impl<'a, L: FnMut(&str, &str) -> Result<Vec<MtlMaterial>>> Joiner<'a, L> {
             ..Obj::default()
         };
         let (by_name, left_out) = (HashMap::new(), Vec::new());
-        Self { file, obj, by_name, material: None, first_face: None, left_out, open_library }
+        Self { file, obj, by_name, material: None, has_faces: false, left_out, open_library }
     }
 
     fn add(&mut self, piece: Piece) -> Result<()> {
         let mut runs = Vec::new();
         let mut done = 0;
         for event in &piece.events {
-            if event.faces > done {
-                self.first_face = self.first_face.or(piece.first_face);
-                runs.push((self.material, event.faces - done));
-                done = event.faces;
-            }
+            self.add_run(&mut runs, event.faces - done, piece.first_face);
+            done = event.faces;
             match &event.what {
                 Asked::Material(rest) => self.use_material(event, rest)?,
                 Asked::Library(rest) => self.library(event, rest)?,
@@ -167,11 +164,7 @@ impl<'a, L: FnMut(&str, &str) -> Result<Vec<MtlMaterial>>> Joiner<'a, L> {
         if let Some(error) = piece.error {
             return Err(error);
         }
-        self.first_face = self.first_face.or(piece.first_face);
-        if piece.faces > done {
-            runs.push((self.material, piece.faces - done));
-            self.note_bare_face();
-        }
+        self.add_run(&mut runs, piece.faces - done, piece.first_face);
         self.obj.positions.extend_from_slice(&piece.positions);
         self.obj.uvs.extend_from_slice(&piece.uvs);
         self.obj.normals.extend_from_slice(&piece.normals);
@@ -182,16 +175,22 @@ impl<'a, L: FnMut(&str, &str) -> Result<Vec<MtlMaterial>>> Joiner<'a, L> {
         Ok(())
     }
 
-    /// Remembers the first face, where no material was asked for up to here.
-    fn note_bare_face(&mut self) {
+    /// Notes `count` faces in a row of the material in use; `first` is the line of their piece's first face.
+    fn add_run(&mut self, runs: &mut Vec<(Option<usize>, usize)>, count: usize, first: Option<usize>) {
+        if count == 0 {
+            return;
+        }
+        runs.push((self.material, count));
+        self.has_faces = true;
+        // Before any usemtl, the first face of a piece with faces is the first of these.
         if self.material.is_none() {
-            self.obj.first_bare_face = self.obj.first_bare_face.or(self.first_face);
+            self.obj.first_bare_face = self.obj.first_bare_face.or(first);
         }
     }
 
     fn finish(mut self, lines: usize) -> Result<Obj> {
         let file = self.file;
-        if self.first_face.is_none() {
+        if !self.has_faces {
             return Err(Error::input(file, format!("expected at least one face (f), found none in {lines} lines")));
         }
         for (what, lines, first) in self.left_out {
@@ -226,7 +225,6 @@ impl<'a, L: FnMut(&str, &str) -> Result<Vec<MtlMaterial>>> Joiner<'a, L> {
             let near = suggestion(name, self.obj.materials.iter().map(|m| m.name.as_str()));
             return Err(self.error(event, expected, format!("{name:?}{near}")));
         };
-        self.note_bare_face();
         self.material = Some(index);
         Ok(())
     }
@@ -355,8 +353,8 @@ mod tests {
             let bits = |list: &[f32], i: u32, n: usize| -> Vec<u32> {
                 list.iter().skip(n * i as usize).take(n).map(|x| x.to_bits()).collect()
             };
-            for model in &models {
-                let mesh = &model.mesh;
+            // A group without faces at the end is one to tobj.
+            for mesh in models.iter().map(|model| &model.mesh).filter(|mesh| !mesh.indices.is_empty()) {
                 let (&arity, &material) = faces.next().unwrap();
                 assert_eq!((mesh.indices.len(), mesh.material_id), (arity as usize, material), "{text}");
                 for (corner, &i) in corners[at..].iter().zip(&mesh.indices) {
