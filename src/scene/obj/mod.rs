@@ -293,7 +293,8 @@ mod tests {
     fn the_cut_into_pieces_changes_nothing() {
         let vertex = "v -?[0-9]\\.[0-9]{1,3} [0-9] 0\n|v 1 2 3 4\n|vt 0\\.[0-9]\n|vn 0 0 [0-9]\n|v 1 \\\\\n 2 3\n";
         let face = "f [1-3] [1-3] [1-3]\n|f -1 -2 -3\n|f 1 2 3 [1-4]\n|f 1/1 2/1 3/1\n|f 1//1 2//1 3//1 # x\n";
-        let other = "usemtl (red|blue)\n|mtllib b\n|# a\n|\n|l 1 2\n|wrong 1\n|usemtl green\n|mtllib none\n|f 1 2\n|v x\n";
+        let other =
+            "usemtl (red|blue)\n|mtllib b\n|# a\n|\n|l 1 2\n|wrong 1\n|usemtl green\n|mtllib none\n|f 1 2\n|v x\n";
         let line = prop_oneof![6 => vertex, 6 => face, 1 => other, 1 => "usemtl (red|blue)\n"];
         run(&prop::collection::vec(line, 0..30), |lines| {
             let text = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nmtllib b\n{}", lines.concat());
@@ -321,7 +322,8 @@ mod tests {
     fn an_independent_reader_finds_the_same() {
         let number = "-?[0-9]{1,3}(\\.[0-9]{0,9})?|-?0\\.[0-9]{6,20}|[0-9]e-[0-9]";
         let numbers = prop::collection::vec(number, 36);
-        let face = "f [1-6] [1-6] [1-6]\n|f -1/-2 -2/1 -3/2\n|f 1//[1-3] 2//1 3//-1 4//2\n|f 1/1/1 2/1/2 3/2/1 5/4/3 6/1/2\n";
+        let face =
+            "f [1-6] [1-6] [1-6]\n|f -1/-2 -2/1 -3/2\n|f 1//[1-3] 2//1 3//-1 4//2\n|f 1/1/1 2/1/2 3/2/1 5/4/3 6/1/2\n";
         let other = "usemtl (red|blue)\n|g\n|# a\n";
         let lines = prop::collection::vec(prop_oneof![4 => face, 1 => other], 1..20);
         run(&(numbers, lines), |(numbers, lines)| {
@@ -359,7 +361,11 @@ mod tests {
                 assert_eq!((mesh.indices.len(), mesh.material_id), (arity as usize, material), "{text}");
                 for (corner, &i) in corners[at..].iter().zip(&mesh.indices) {
                     let of = |v: &[f32]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-                    assert_eq!(of(&ours.positions[corner.position()].to_array()), bits(&mesh.positions, i, 3), "{text}");
+                    assert_eq!(
+                        of(&ours.positions[corner.position()].to_array()),
+                        bits(&mesh.positions, i, 3),
+                        "{text}"
+                    );
                     let uv = corner.uv().map_or(Vec::new(), |i| of(&ours.uvs[i].to_array()));
                     assert_eq!(uv, bits(&mesh.texcoords, i, 2), "{text}");
                     let normal = corner.normal().map_or(Vec::new(), |i| of(&ours.normals[i].to_array()));

@@ -111,8 +111,10 @@ mod tests {
         ];
         run(&prop::collection::vec((word, "[ \t]{1,2}"), 0..5), |words| {
             let text: String = words.iter().map(|(word, blank)| format!("{word}{blank}")).collect();
-            let slow: Vec<Option<u32>> =
-                text.split_whitespace().map(|w| w.parse().ok().filter(|x: &f32| x.is_finite()).map(f32::to_bits)).collect();
+            let slow: Vec<Option<u32>> = text
+                .split_whitespace()
+                .map(|w| w.parse().ok().filter(|x: &f32| x.is_finite()).map(f32::to_bits))
+                .collect();
             if let Some((n, values)) = plain_numbers(text.as_bytes()) {
                 assert_eq!(n, slow.len(), "{text:?}");
                 let values = values.map(|x| Some(x.to_bits()));
