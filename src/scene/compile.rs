@@ -84,7 +84,9 @@ impl Scene {
     pub fn new(config: &SceneConfig, mesh: Mesh, size: (u32, u32), stage: Stage) -> Result<Self> {
         let reach = reach(&mesh, config.camera.pos);
         check_reach(reach)?;
-        let accel = Accel::new(&geometry::triangles(&mesh), reach);
+        // Side by side: the tree is built by one thread.
+        let (accel, faces) =
+            rayon::join(|| Accel::new(&geometry::triangles(&mesh), reach), || geometry::faces(&mesh));
         let mut layout = SampleLayout::default();
         let pixel = match stage {
             Stage::Start => PixelSample::Center,
@@ -108,7 +110,6 @@ impl Scene {
         }
         let camera = Camera::new(&config.camera, size, pixel, aperture);
         let focus = Focus { auto: config.auto_focus, configured: config.camera.focal_depth };
-        let faces = geometry::faces(&mesh);
         let mut scene =
             Self { mesh, faces, accel, camera, lights, estimator: config.estimator, layout, warnings, focus };
         scene.refocus();
