@@ -10,7 +10,11 @@ mod screen;
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
+use exr::block::writer::ChunksWriter;
+use exr::block::{BlockIndex, UncompressedBlock, enumerate_ordered_header_block_indices};
+use exr::image::write::layers::{LayersWriter, WritableLayers};
 use exr::prelude::*;
+use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 
@@ -110,14 +114,31 @@ pub fn write_exr(path: &Path, image: &Image, provenance: &[(String, String)]) ->
     }
     let encoding = Encoding { compression: Compression::ZIP16, ..Encoding::default() };
     let file = exr::prelude::Image::from_layer(Layer::new(size, layer, encoding, channels));
-    let mut bytes = Cursor::new(Vec::new());
-    file.write()
-        .non_parallel()
-        .to_buffered(&mut bytes)
-        .map_err(|e| Error::write(path, format!("cannot encode EXR: {e}")))?;
-    let bytes = with_sorted_attributes(bytes.into_inner())
+    let bytes = encode_exr(&file).map_err(|e| Error::write(path, format!("cannot encode EXR: {e}")))?;
+    let bytes = with_sorted_attributes(bytes)
         .ok_or_else(|| Error::write(path, "cannot encode EXR: its header does not read back"))?;
     write_renamed(path, &bytes, false)
+}
+
+/// The file's bytes. As the package's own writer makes them, with the blocks compressed side by side and written in their order.
+fn encode_exr<'a, L: WritableLayers<'a>>(file: &'a exr::prelude::Image<L>) -> exr::error::Result<Vec<u8>> {
+    let headers = file.write().infer_meta_data();
+    let layers = file.layer_data.create_writer(&headers);
+    let mut bytes = Cursor::new(Vec::new());
+    exr::block::write(&mut bytes, headers, true, |meta, chunks| {
+        let blocks: Vec<_> = enumerate_ordered_header_block_indices(&meta.headers).collect();
+        let compress = |&(number, index): &(usize, BlockIndex)| {
+            let data = layers.extract_uncompressed_block(&meta.headers, index);
+            Ok((number, UncompressedBlock { index, data }.compress_to_chunk(&meta.headers)?))
+        };
+        let compressed: Vec<exr::error::Result<_>> = blocks.par_iter().map(compress).collect();
+        for chunk in compressed {
+            let (number, chunk) = chunk?;
+            chunks.write_chunk(number, chunk)?;
+        }
+        Ok(())
+    })?;
+    Ok(bytes.into_inner())
 }
 
 /// Puts the attributes of a single-part OpenEXR file into the order of their names.
@@ -197,7 +218,8 @@ pub fn write_png_rgb8(path: &Path, width: u32, height: u32, bytes: &[u8]) -> Res
             .map_err(|e| Error::write(path, format!("cannot encode PNG: {e}")))?;
         Ok(png)
     };
-    let (filtered, plain) = (encoded(FilterType::Adaptive)?, encoded(FilterType::NoFilter)?);
+    let (filtered, plain) = rayon::join(|| encoded(FilterType::Adaptive), || encoded(FilterType::NoFilter));
+    let (filtered, plain) = (filtered?, plain?);
     let png = if plain.len() < filtered.len() { plain } else { filtered };
     write_whole(path, &png)
 }
@@ -232,6 +254,25 @@ mod tests {
         }
         assert_eq!(read_exr(&path).unwrap(), (image, provenance));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no partial file is left");
+    }
+
+    /// The package's own writer, one block after another, is the model.
+    #[test]
+    fn blocks_compressed_side_by_side_make_the_same_file() {
+        let mut image = Image::black(37, 83);
+        for (i, p) in image.pixels.iter_mut().enumerate() {
+            *p = [(i % 19) as f32, i as f32 * 0.37, 1.0 / (1 + i) as f32];
+        }
+        let channels = SpecificChannels::rgb(|at: Vec2<usize>| {
+            let [r, g, b] = image.pixels[at.y() * 37 + at.x()];
+            (r, g, b)
+        });
+        let encoding = Encoding { compression: Compression::ZIP16, ..Encoding::default() };
+        let layer = Layer::new(Vec2(37, 83), LayerAttributes::default(), encoding, channels);
+        let file = exr::prelude::Image::from_layer(layer);
+        let mut one_by_one = Cursor::new(Vec::new());
+        file.write().non_parallel().to_buffered(&mut one_by_one).unwrap();
+        assert_eq!(encode_exr(&file).unwrap(), one_by_one.into_inner());
     }
 
     #[test]

@@ -79,8 +79,8 @@ impl Accel {
     /// Builds the tree over `triangles`, whose indices hits will name.
     ///
     /// `reach` bounds the coordinates of every ray's origin and its distance to everything it meets; it sets how far boxes
-    /// are padded (see [`box_padding`]). Triangles without area are never hit. The build reads no clock and uses no
-    /// threads, so the tree is a function of its arguments.
+    /// are padded (see [`box_padding`]). Triangles without area are never hit. The build reads no clock, and the
+    /// tree is the same on any number of threads.
     pub fn new(triangles: &[Triangle], reach: f32) -> Self {
         let pad = box_padding(reach);
         let mut accel = Self {
@@ -212,4 +212,31 @@ fn obvhs_tree(triangles: &[Triangle], pad: f32) -> Bvh2 {
     collapse(&mut tree, LEAF_TRIANGLES, 3.0);
     reinsertion.run(&mut tree, 0.1, None);
     tree
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// More triangles than the builder gives to one thread, many of them alike, so that costs tie.
+    #[test]
+    fn the_tree_is_the_same_on_any_number_of_threads() {
+        let triangles: Vec<Triangle> = (0..12_000u32)
+            .map(|i| {
+                let at = |k: u32| (i.wrapping_mul(2_654_435_761).rotate_left(k) >> 24) as f32;
+                let corner = Vec3::new(at(0), at(9), if i % 3 == 0 { 5.0 } else { at(17) });
+                Triangle { corners: [corner, corner + Vec3::X, corner + Vec3::Y] }
+            })
+            .collect();
+        let tree = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            pool.install(|| Accel::new(&triangles, 600.0))
+        };
+        let one = tree(1);
+        for other in [2, 3, 7].map(tree) {
+            assert_eq!((other.depth, other.nodes.len()), (one.depth, one.nodes.len()));
+            assert!(other.nodes.iter().zip(&one.nodes).all(|(a, b)| a.bounds == b.bounds && a.children == b.children));
+            assert!(other.slots.iter().map(|slot| slot.id).eq(one.slots.iter().map(|slot| slot.id)));
+        }
+    }
 }

@@ -88,6 +88,16 @@ impl Render {
         let framebuffer = loaded.config.framebuffer;
         loaded.config.estimator = estimator.unwrap_or(loaded.config.estimator);
         let size = size.unwrap_or(Size { width: framebuffer.res_w, height: framebuffer.res_h });
+        let stated = Scene::most_bytes(&loaded.mesh, size.pixels());
+        check_memory(stated)?;
+        if !self.work.quiet {
+            let triangles = loaded.mesh.len();
+            say(format_args!(
+                "{}: {triangles} triangles; at most about {} MB",
+                self.scene.display(),
+                stated / 1_000_000 + 1
+            ));
+        }
         let started = Instant::now();
         let mut scene = Scene::new(&loaded.config, loaded.mesh, (size.width, size.height), stage)?;
         scene.accel.set_kernel(kernel.unwrap_or(Kernel::detected()));
@@ -100,16 +110,14 @@ impl Render {
         let sampler = Sampler::new(set, &scene.layout, asked, self.seed)?;
         let samples = size.pixels() * u64::from(sampler.samples());
         if !self.work.quiet {
-            let bytes = scene.bytes() as u64 + 24 * size.pixels();
             say(format_args!(
-                "{} at {size}, {} samples a pixel of {}; about {} MB",
+                "{} at {size}, {} samples a pixel of {}",
                 self.scene.display(),
                 sampler.samples(),
                 match set.single() {
                     Some(spec) => format!("{} = {}", self.sampler, spec.expansion()),
                     None => set.expansion(),
-                },
-                bytes / 1_000_000 + 1
+                }
             ));
             say(format_args!("{}: {}", stage.name(), scene.layout));
         }
@@ -169,6 +177,7 @@ impl Render {
                 "build_seconds": build_seconds,
                 "samples_per_second": per_second(samples),
                 "rays_per_second": per_second(rendered.rays),
+                "stated_bytes": stated,
                 "peak_bytes": peak_bytes(),
             }))?;
         }
@@ -203,9 +212,30 @@ fn bar(samples: u64, quiet: bool) -> ProgressBar {
     bar.with_style(style.expect("the template is well formed"))
 }
 
+/// Refuses work that needs more memory than is free: else the system would end the process in the middle of it.
+///
+/// # Errors
+/// Kind `Input` with both numbers, where the system tells what is free.
+fn check_memory(needed: u64) -> Result<()> {
+    let Some(free) = free_bytes().filter(|free| *free < needed) else { return Ok(()) };
+    let [needed, free] = [needed, free].map(|bytes| bytes / 1_000_000);
+    let what = format!("expected a scene and an image that fit, found about {needed} MB needed and {free} MB free");
+    Err(Error::input("memory", what))
+}
+
+/// Memory that new work can have, where the system tells it.
+fn free_bytes() -> Option<u64> {
+    kilobytes_of("/proc/meminfo", "MemAvailable:")
+}
+
 /// Largest resident size of this process so far, where the system tells it.
 fn peak_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    kilobytes_of("/proc/self/status", "VmHWM:")
+}
+
+/// The bytes in the line of a system's file that begins with `name`.
+fn kilobytes_of(file: &str, name: &str) -> Option<u64> {
+    let text = std::fs::read_to_string(file).ok()?;
+    let line = text.lines().find(|line| line.starts_with(name))?;
     Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
 }
