@@ -6,6 +6,7 @@
 
 mod grow;
 mod halves;
+mod rounds;
 
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
@@ -205,6 +206,7 @@ pub fn execute_locked(
     let mut run = Run::new(plan, backend, out, progress, options, standing, meter)?;
     let (done, mut interrupted) = run.all_items(&part)?;
     interrupted |= !interrupted && run.right_wrong_rows()?;
+    interrupted |= !interrupted && run.time_again(&part)?;
     if !interrupted {
         run.keep_references()?;
         run.write_in_plan_order()?;
@@ -641,7 +643,7 @@ impl<'a> Run<'a> {
         let (samples, threads) = (item.samples(), self.options.threads);
         if !self.timings.contains_key(&item.id) {
             let (id, host) = (item.id.clone(), self.host.clone());
-            let timing = Timing { id, seconds, samples, host, threads, load };
+            let timing = Timing { id, seconds, samples, host, threads, load, again: None };
             self.timings_log.append(line(&timing))?;
             self.timings.insert(item.id.clone(), timing);
         }

@@ -365,6 +365,17 @@ impl Plan {
         row
     }
 
+    /// Whether an image is one of those that are made again for their seconds: of each scene, sampler and count asked for the
+    /// first of the images that samplers are compared by.
+    pub fn is_timed_again(&self, item: &WorkItem) -> bool {
+        let (Some(timing), Work::Image(work)) = (&self.experiment.timing, &item.work) else { return false };
+        work.kind == Kind::Render
+            && work.replicate == 0
+            && work.variant.is_plain()
+            && work.estimator == self.experiment.estimator.primary()
+            && timing.spp.contains(&work.spp.asked)
+    }
+
     /// What a reference may grow by; `None` where it does not grow.
     pub fn growth(&self, reference_id: &str) -> Option<&GrowthWork> {
         match &self.items[self.position(reference_id)?].work {
