@@ -13,10 +13,11 @@ pub use super::backend::{Estimator, PointMetrics, SceneFacts, Size, Stage, Varia
 use super::backend::{estimator_word, stage_word};
 
 pub use super::growth::{Growth, is_enough};
-pub(super) use super::timing::parse_timing;
-pub use super::timing::{Rounds, Timing};
 use super::identity::{ID_LENGTH, pixel_hash};
 use super::lines::{line, lines, sound_lines};
+pub use super::peers::{PeerPoint, Peers};
+pub(super) use super::timing::parse_timing;
+pub use super::timing::{Rounds, Timing};
 use crate::error::{Error, Result};
 use crate::film::{Image, read_exr};
 pub use crate::stats::ErrorSpectrum;
