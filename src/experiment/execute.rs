@@ -500,7 +500,9 @@ impl<'a> Run<'a> {
     fn ensemble_row(&mut self, item: &WorkItem, work: &EnsembleWork) -> Result<EnsembleRow> {
         let members: Vec<Arc<Image>> = work.members.iter().map(|id| self.image(id)).collect::<Result<_>>()?;
         let reference = self.reference(&work.reference_id)?;
-        let (e, error_autocorrelation) = measure::ensemble(&members, &reference);
+        let spectrum = || work.variant.is_plain().then(|| Box::new(pixels::spectrum(&members, &reference)));
+        let ((e, error_autocorrelation), error_spectrum) =
+            rayon::join(|| measure::ensemble(&members, &reference), spectrum);
         let exposure = self.plan.exposure(&work.scene);
         // What a member's row says of the same comparison need not be looked at twice.
         let known = |id: &String| match self.rows.get(id) {
@@ -537,7 +539,7 @@ impl<'a> Run<'a> {
             bias: e.bias,
             error_autocorrelation,
             flip: Some(t_interval(&flips, 0.95).with_rounded_interval()),
-            error_spectrum: work.variant.is_plain().then(|| Box::new(pixels::spectrum(&members, &reference))),
+            error_spectrum,
             members: work.members.clone(),
             made_with: None,
         })
@@ -649,7 +651,7 @@ impl<'a> Run<'a> {
         }
         self.meter.add_samples(samples);
         let provenance = self.provenance(item);
-        self.images.save(&item.id, image, &provenance)
+        self.images.save(&item.id, image, &provenance, item.is_shown)
     }
 
     /// What to ask the backend for, where the image is rendered.
