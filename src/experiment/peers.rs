@@ -3,13 +3,14 @@
 //! A file of its own, as `benches/peers/run.sh` writes it:
 //!
 //! ```json
-//! {"note": "RMSE over the pixels that do not show the light",
+//! {"note": "warm renders",
 //!  "points": [{"name": "Mitsuba 3.9.1 independent", "scene": "cornell", "size": "128x128", "spp": 64,
 //!              "seconds": 0.03, "seconds_range": [0.029, 0.034], "rmse": 0.0067, "rmse_range": [0.0066, 0.0068],
 //!              "machine": "AMD EPYC, 2 threads", "date": "2026-11-25"}]}
 //! ```
 //!
-//! `note`, `seconds_range` and `rmse_range` are optional. What is read is kept in `experiment.json`, so a report needs no file.
+//! `rmse` is over all pixels and channels of the picture in linear radiance, as ours is: an error that leaves some pixels out is
+//! another quantity and belongs in no such file. `note`, `seconds_range` and `rmse_range` are optional. What is read is kept in `experiment.json`, so a report needs no file.
 
 use std::path::Path;
 
@@ -54,7 +55,7 @@ pub struct PeerPoint {
     /// Their range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seconds_range: Option<[f64; 2]>,
-    /// RMSE, radiance.
+    /// RMSE over all pixels and channels, radiance.
     pub rmse: f64,
     /// Its interval or range.
     #[serde(default, skip_serializing_if = "Option::is_none")]

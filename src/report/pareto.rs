@@ -217,7 +217,7 @@ impl<'a> Chart<'a> {
             };
             // Corners may miss the plot by a rounding.
             let inside = |(x, y): Place| (x.clamp(self.b.left, self.b.right), y.clamp(self.b.top, self.b.bottom));
-            drawing.line(&[inside(from), inside(to)], 1.0, PALE, Dash::Solid);
+            drawing.line(&[inside(from), inside(to)], 1.0, lightened(PALE, 0.4), Dash::Solid);
         }
         let first = named.iter_mut().min_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((_, text)) = first {

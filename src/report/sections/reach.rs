@@ -63,7 +63,8 @@ impl Level {
 }
 
 /// The levels that a scene's times are stated for: the experiment's, else what uniform sampling comes down to at the counts that
-/// budgets are taken from, rounded up to two digits. The largest first.
+/// budgets are taken from, without the smallest count of all, before which there is nothing to compare: the upper end of its
+/// interval rounded up to two digits. The largest first.
 fn levels(summary: &Summary, scene: usize) -> Vec<f64> {
     let experiment = &summary.about.experiment;
     let asked = experiment.timing.as_ref().and_then(|t| t.rmse.get(experiment.scenes.get(scene)?));
@@ -71,8 +72,10 @@ fn levels(summary: &Summary, scene: usize) -> Vec<f64> {
         Some(levels) => levels.clone(),
         None => {
             let cell = |spp: u32| summary.cell(scene, summary.uniform()?, spp);
-            let rmse = budget_counts(summary).into_iter().filter_map(|spp| cell(spp)?.rmse);
-            rmse.filter(|rmse| rmse.value > 0.0).map(|rmse| two_digits_up(rmse.value)).collect()
+            let smallest = experiment.spp.iter().copied().min();
+            let counts = budget_counts(summary).into_iter().filter(|spp| Some(*spp) != smallest);
+            let rmse = counts.filter_map(|spp| cell(spp)?.rmse).filter(|rmse| rmse.value > 0.0);
+            rmse.map(|rmse| two_digits_up(rmse.ci95.map_or(rmse.value, |[_, high]| high))).collect()
         }
     };
     levels.sort_by(|a, b| b.total_cmp(a));
@@ -154,6 +157,13 @@ fn least(summary: &Summary, scene: usize, sampler: usize) -> String {
 fn fastest(summary: &Summary, level: &Level) -> Option<String> {
     let is_sound = |sampler: usize| flaws(summary, level.scene, sampler).is_empty();
     let at = format!("RMSE {} in {}", short(level.rmse), scene_name(summary, level.scene));
+    let early = level.reaches.iter().filter(|(i, reach)| is_sound(*i) && matches!(reach, Reach::Within(_))).count();
+    if early > 0 {
+        return Some(format!(
+            "{at}: {} there with the smallest count already, and fewer samples were not tried, so none is called the first.",
+            counted(early, "of them is", "of them are")
+        ));
+    }
     let ranked = level.ranked(is_sound);
     let Some(((first, seconds), rest)) = ranked.split_first().map(|(a, b)| (*a, b)) else {
         let none = || format!("{at}: no sampler that nothing speaks against gets there between two of its counts.");
