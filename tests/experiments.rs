@@ -548,7 +548,7 @@ fn images_are_timed_again_in_rounds_that_leave_no_trace_in_the_results() {
     // Two scenes, three samplers, one count: the first replicate of each, 4 spp of 20 and of 16 pixels.
     let rounds = rounds_of(&plan, folder.path());
     assert_eq!((rounds.len(), rounds.values().copied().collect::<HashSet<_>>()), (6, HashSet::from([3])));
-    assert!(rounds.keys().all(|label| label.ends_with("replicate 0") && label.contains("spp 4")), "{rounds:?}");
+    assert!(rounds.keys().all(|label| label.ends_with("replicate 0") && label.contains(" 4 spp ")), "{rounds:?}");
     assert_eq!(survey.samples_timing, 3 * 3 * 4 * (20 + 16));
     let others = plan.items.iter().filter(|item| item.kept_image().is_some()).count();
     assert_eq!(toy.renders(), others + 3 * 6);
