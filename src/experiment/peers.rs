@@ -185,7 +185,7 @@ mod tests {
     #[test]
     fn bad_files_are_refused_with_their_place() {
         for (good, bad, what) in [
-            ("\"points\"", "\"pionts\"", "did you mean \"points\"?"),
+            ("\"points\"", "\"pionts\"", "expected the key \"points\", found none; did you mean \"pionts\"?"),
             (POINT, "", "points: expected a list of 1 to 1000 points"),
             ("\"M 3 independent\"", "\"\"", "points[0].name: expected a line of 1 to 200 letters"),
             ("\"8x4\"", "\"8\"", "points[0].size: expected a size"),

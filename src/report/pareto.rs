@@ -327,11 +327,13 @@ impl<'a> Chart<'a> {
         }
     }
 
-    /// First and last row of pixels that a trial's marker and vertical bar take.
+    /// First and last row of pixels that names keep clear of for a trial: its marker and its box, of a tall box (an error that is
+    /// hardly known) the middle alone, since a name reads well on its light tint and would be far from its own marker else.
     fn rows(&self, trial: &Trial) -> (f64, f64) {
         let y = self.place(trial).1;
         let (low, high) = trial.error_interval.unwrap_or((trial.error, trial.error));
-        (self.y.clamped(high).min(y - 6.0), self.y.clamped(low).max(y + 6.0))
+        let reach = |end: f64| self.y.clamped(end).clamp(y - TALL, y + TALL);
+        (reach(high).min(y - 6.0), reach(low).max(y + 6.0))
     }
 
     /// Baselines of the front's names: each just below its marker or below the name before it; at the bottom moved up
@@ -356,6 +358,8 @@ impl<'a> Chart<'a> {
 /// Size of a name in pixels, and from one name's line to the next.
 const NAME: f64 = 11.0;
 const NAME_STEP: f64 = 12.5;
+/// How far a box keeps names off above and below its marker.
+const TALL: f64 = 20.0;
 /// Names take at most this share of the plot's width.
 const NAME_SHARE: f64 = 0.4;
 

@@ -76,7 +76,7 @@ pub fn maps(summary: &Summary, all: &[SetPower]) -> Option<Rgb8> {
     let maps: Vec<Rgb8> = all.iter().map(|found| map(&found.mean)).collect();
     let label = |found: &SetPower| summary.samplers[found.sampler].label.clone();
     let cells: Vec<StripCell> = all.iter().zip(&maps).map(|(found, map)| StripCell::new(map, &label(found))).collect();
-    let label = "log₂ of the power; 0: independent points, −3: an eighth of it".to_owned();
+    let label = "log2 of the power; 0: as independent points, −3: an eighth of that".to_owned();
     let scale_bar = Some(ScaleBar { scale: libm::log2(FACTOR), label });
     let layout = StripLayout { columns: cells.len().clamp(1, 5), whole: Some(4), crops: Vec::new(), scale_bar };
     (!cells.is_empty()).then(|| strip(&cells, &layout).ok()).flatten()
