@@ -152,7 +152,7 @@ pub fn predicted_variance(summary: &Summary) -> Option<Figure> {
             interval: ends(&p.measured).map(|(low, high)| (low / p.predicted, high / p.predicted)),
         };
         let label = summary.samplers.iter().find(|s| s.canonical == found.sampler).map(|s| s.label.clone());
-        let way = if found.is_stationary { "exact" } else { "approximation" };
+        let way = if found.is_stationary { "exact" } else { "approx." };
         let label = label.unwrap_or_else(|| found.sampler.clone());
         DotRow { label: format!("{label} ({way})"), dots: dots.map(dot).collect() }
     };

@@ -61,7 +61,7 @@ fn words(summary: &Summary, all: &[SetPower]) -> String {
         all.iter().filter(|found| keep(found)).map(|found| name(summary, found.sampler)).collect()
     };
     let less = names(&|found| below(&found.low, 1.0) == Answer::Yes);
-    let peaked = names(&|found| found.mean.peak().is_some_and(|peak| peak.p_value < 0.01));
+    let peaked = names(&|found| found.mean.peak().is_some_and(|peak| peak.p_value < 0.001));
     let mut text = match less.len() {
         0 => "No sampler has less power than independent points at low frequencies".to_owned(),
         n => format!("At low frequencies {} of {} less power than independent points", n, has_have(all.len())),
@@ -69,7 +69,7 @@ fn words(summary: &Summary, all: &[SetPower]) -> String {
     text += &match peaked.as_slice() {
         [] => "; none has a peak that independent points would not have".to_owned(),
         peaked => format!(
-            "; more power at some frequency than chance gives independent points {} {}: an image with detail just there would err more under {}",
+            "; more power at some frequency than chance gives independent points (p < 0.001) {} {}: an image with detail just there would err more under {}",
             if peaked.len() == 1 { "has" } else { "have" },
             listed(peaked),
             if peaked.len() == 1 { "it" } else { "them" }
