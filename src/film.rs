@@ -101,6 +101,19 @@ const ATTRIBUTE_PREFIX: &str = "sampler_lab.";
 /// # Errors
 /// Kind `Write` where the file cannot be written.
 pub fn write_exr(path: &Path, image: &Image, provenance: &[(String, String)]) -> Result<()> {
+    write_exr_as(path, image, provenance, Compression::ZIP16)
+}
+
+/// As [`write_exr`], without compression: for images that are read once by the program itself, since noise in `f32` hardly
+/// shrinks and compressing it takes longer than to measure it.
+///
+/// # Errors
+/// As [`write_exr`].
+pub fn write_exr_plain(path: &Path, image: &Image, provenance: &[(String, String)]) -> Result<()> {
+    write_exr_as(path, image, provenance, Compression::Uncompressed)
+}
+
+fn write_exr_as(path: &Path, image: &Image, provenance: &[(String, String)], compression: Compression) -> Result<()> {
     let size = Vec2(image.width as usize, image.height as usize);
     let channels = SpecificChannels::rgb(|at: Vec2<usize>| {
         let [r, g, b] = image.pixels[at.y() * image.width as usize + at.x()];
@@ -112,7 +125,7 @@ pub fn write_exr(path: &Path, image: &Image, provenance: &[(String, String)]) ->
         let name = Text::from(format!("{ATTRIBUTE_PREFIX}{name}").as_str());
         layer.other.insert(name, AttributeValue::Text(Text::from(value.as_str())));
     }
-    let encoding = Encoding { compression: Compression::ZIP16, ..Encoding::default() };
+    let encoding = Encoding { compression, ..Encoding::default() };
     let file = exr::prelude::Image::from_layer(Layer::new(size, layer, encoding, channels));
     let bytes = encode_exr(&file).map_err(|e| Error::write(path, format!("cannot encode EXR: {e}")))?;
     let bytes = with_sorted_attributes(bytes)

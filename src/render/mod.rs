@@ -4,9 +4,11 @@
 
 mod direct;
 mod lanes;
+mod numbers;
 mod tiles;
 
 pub use direct::light_contribution;
+pub use numbers::draw_numbers;
 pub use tiles::{NonFinite, Rendered, render, render_observed, render_sample, render_while};
 
 use crate::accel;
