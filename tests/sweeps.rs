@@ -583,7 +583,7 @@ fn no_old_report_stands_beside_new_rows() {
     desk.run("a", &[]).with(0, &[]);
     std::fs::write(desk.path("small.json"), SMALL.replace("[1, 16]", "[1, 4, 16]")).unwrap();
     desk.run("a", &["--shard", "3/3"]).with(0, &[]);
-    for name in ["report.md", "summary.csv", "slopes.csv"] {
+    for name in ["report.md", "report.html", "summary.csv", "slopes.csv"] {
         assert!(!desk.path("a").join(name).exists(), "{name}");
     }
     desk.lab(&["report", "a"]).with(4, &["missing"]);
