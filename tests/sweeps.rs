@@ -195,7 +195,9 @@ fn mix(x: u64) -> u64 {
 fn a_run_killed_at_twenty_random_moments_goes_on_to_the_bytes_of_one_that_was_not() {
     let desk = Desk::new();
     desk.run("whole", &[]).with(0, &[]);
-    let (expected, total) = (desk.results("whole"), size(&desk.path("whole")));
+    // The page is written last and at once, and is half of all bytes: moments inside it would find no run at work.
+    let page = std::fs::metadata(desk.path("whole/report.html")).unwrap().len();
+    let (expected, total) = (desk.results("whole"), size(&desk.path("whole")) - page);
     let mut killed = 0;
     for chain in 0..4u64 {
         let out = format!("killed-{chain}");

@@ -46,13 +46,12 @@ fn nameless(page: &Page) -> Vec<String> {
     let is_nameless = |node: &&Value| {
         let role = node["role"]["value"].as_str().unwrap_or("");
         let name = node["name"]["value"].as_str().unwrap_or("");
-        // A folded part of a page is a group whose summary names it.
-        let needs = roles.contains(&role) && !(role == "group" && node["properties"].to_string().contains("expanded"));
-        needs && name.trim().is_empty()
+        roles.contains(&role) && name.trim().is_empty()
     };
     let describe = |node: &Value| {
         let found = page.call("DOM.describeNode", json!({"backendNodeId": node["backendDOMNodeId"]}));
         let (name, attributes) = (&found["node"]["localName"], &found["node"]["attributes"]);
+        // A folded part of a page is a group whose summary names it.
         (name != "details").then(|| format!("no name: {} {name} {attributes}", node["role"]["value"]))
     };
     nodes.filter(is_nameless).filter_map(describe).collect()
@@ -119,8 +118,8 @@ const CONTRAST: &str = r#"
 
 const FOCUS: &str = r#"
   const before = document.activeElement;
-  for (const control of document.querySelectorAll("header a, header select, .viewer button, .viewer select, .viewer input, .viewer summary, .stage, main a")) {
-    if (!control.checkVisibility()) continue;
+  for (const control of document.querySelectorAll("header a[href], header select, .viewer button, .viewer select, .viewer input, .viewer summary, .stage, main a[href]")) {
+    if (!control.checkVisibility() || control.disabled) continue;
     control.focus({ focusVisible: true });
     const style = getComputedStyle(control);
     if (document.activeElement !== control) found.push(`cannot have the focus: ${control.outerHTML.slice(0, 60)}`);

@@ -203,7 +203,7 @@ impl<'a> Writer<'a> {
     fn take_of_picture(&mut self, event: Event<'a>) {
         let Some((path, words)) = &mut self.picture else { return };
         match event {
-            Event::Text(text) | Event::Code(text) => words.push_str(&text),
+            Event::Text(text) | Event::Code(text) | Event::InlineHtml(text) => words.push_str(&text),
             Event::SoftBreak | Event::HardBreak => words.push(' '),
             Event::End(TagEnd::Image) => {
                 let (is_chart, words) = (path.ends_with(".svg"), escaped(words));
@@ -305,7 +305,9 @@ mod tests {
             "## <script>x</script>",
         ] {
             let page = html(&format!("{hostile}\n"));
-            for bad in ["<script", "<img src", "<b ", " onclick=\"x\"", "id=\"other", "<details open", "onerror=\"y"] {
+            for bad in
+                ["<script", "<img src", "<b ", "<a id=\"figure-1\" ", "<a id=\"other", "<details open", "onerror=\"y"]
+            {
                 assert!(!page.contains(bad), "{hostile}: {page}");
             }
         }

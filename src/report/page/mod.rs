@@ -1,6 +1,6 @@
 //! `report.html`: the report as one file that opens from disk, with no network: text, figures and the flip viewer.
 //!
-//! The text is rendered from the same Markdown as `report.md`, so nothing is said twice. The page's own code ([`STYLE`], [`SCRIPT`])
+//! The text is rendered from the same Markdown as `report.md`, so nothing is said twice. The page's own code
 //! is plain CSS and JavaScript in this folder. It shows and computes nothing of the lab: errors, intervals, FLIP and the screen's
 //! curve come with the pictures ([`viewer`]). The page may load nothing and run no script but its own: its policy says so
 //! to the browser, by the digest of that script.

@@ -21,7 +21,7 @@ pub struct Halves {
     pub scale: f32,
 }
 
-/// The half float nearest to `x`, ties to even (IEEE 754 binary16); beyond [`LARGEST`] that, for a number that is not one 0.
+/// The half float nearest to `x`, ties to even (IEEE 754 binary16); beyond the largest, 65 504, that, for a number that is not one 0.
 pub fn to_half(x: f32) -> u16 {
     let sign = (x.to_bits() >> 16 & 0x8000) as u16;
     let size = x.abs();
@@ -65,7 +65,7 @@ impl Halves {
     }
 
     /// Base64 of the deflated bytes: for each of the planes G, R − G, B − G of the bits (modulo 2¹⁶; a constant where a surface's
-    /// colour is) the [`residuals`], all their high bytes, then all their low ones.
+    /// colour is) what a value is beyond its neighbours' mean, all high bytes, then all low ones.
     pub fn packed(&self) -> String {
         let plane =
             |f: &dyn Fn(&[u16; 3]) -> u16| residuals(&self.pixels.iter().map(f).collect::<Vec<_>>(), self.width);
@@ -96,7 +96,7 @@ fn residuals(plane: &[u16], width: usize) -> Vec<u16> {
     (0..plane.len()).map(residual).collect()
 }
 
-/// Shares from 0 to 1 in 255 steps, as base64 of the deflated [`residuals`], two bytes each like a plane of [`Halves`].
+/// Shares from 0 to 1 in 255 steps, predicted, deflated and in base64, two bytes each like a plane of [`Halves`].
 pub fn packed_shares(shares: &[f64], width: usize) -> String {
     let plane: Vec<u16> = shares.iter().map(|share| (share.clamp(0.0, 1.0) * 255.0).round() as u16).collect();
     let plane = residuals(&plane, width);

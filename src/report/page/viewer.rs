@@ -274,7 +274,7 @@ mod tests {
         let least: Vec<f32> = thresholds().split(' ').map(|text| text.parse().unwrap()).collect();
         assert_eq!(least.len(), 255);
         let code = |exposed: f32| to_screen(&Image { width: 1, height: 1, pixels: vec![[exposed; 3]] }, 1.0)[0];
-        for (wanted, &at) in (1_u8..).zip(&least) {
+        for (wanted, &at) in (1..=255_u8).zip(&least) {
             assert_eq!((code(at), code(f32::from_bits(at.to_bits() - 1))), (wanted, wanted - 1));
         }
     }
