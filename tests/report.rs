@@ -15,6 +15,7 @@ use sampler_lab::experiment::results::{
     read_about, read_timings, timings_path,
 };
 use sampler_lab::experiment::spec::{Experiment, TimedRounds};
+use sampler_lab::report::page::viewer;
 use sampler_lab::report::{Figures, Measurements, Summary, summarise, text, text_with, write};
 use sampler_lab::stats::Estimate;
 
@@ -631,10 +632,58 @@ fn every_picture_scene_has_its_strips_and_equal_time_takes_the_count_that_costs_
     assert!(lines[0].starts_with("| `uniform:best` | 2 | 2.00 | 1.00 |"), "{lines:?}");
     assert!(lines[1].starts_with("| `ld:best` | 4 | 2.00 | 1.00 |"), "{lines:?}");
     assert!(page.contains("`cornell` in three stages"), "a scene without a lens has no stage for it");
-    // Without the images the figures stay, and so do the words.
+    let html = std::fs::read(folder.path().join("report.html")).unwrap();
+    // Without the images the figures stay, and so do the words and the pictures of the page.
     std::fs::remove_dir_all(folder.path().join("images")).unwrap();
     write(folder.path()).unwrap();
     assert_eq!(std::fs::read_to_string(&written.report).unwrap(), page);
+    assert!(std::fs::read(folder.path().join("report.html")).unwrap() == html, "the viewer's pictures are kept");
+}
+
+#[test]
+fn the_page_has_the_text_the_figures_and_a_viewer_of_each_picture_scene_and_nothing_from_outside() {
+    let folder = pictured();
+    write(folder.path()).unwrap();
+    let path = folder.path().join("report.html");
+    let page = std::fs::read_to_string(&path).unwrap();
+    assert_eq!(page.matches("<section class=\"viewer\"").count(), 2);
+    // A reference, two samplers at equal samples, and ld:best's other count at equal time, in each.
+    assert_eq!(page.matches("class=\"picture\" data-label=").count(), 2 * 4);
+    let markdown = std::fs::read_to_string(folder.path().join("report.md")).unwrap();
+    assert_eq!(page.matches("<img class=").count(), markdown.matches("![Figure ").count());
+    assert_eq!(page.matches("<table>").count(), markdown.lines().filter(|line| line.starts_with("| ---")).count());
+    // Whatever an attribute names is in the page or in its address.
+    for attribute in ["src=\"", "href=\""] {
+        for piece in page.split(attribute).skip(1) {
+            assert!(piece.starts_with("data:") || piece.starts_with('#'), "{attribute}{}", &piece[..40]);
+        }
+    }
+    assert!(!page.contains("http://") && !page.contains("https://"), "an address of the network");
+    // A viewer that may take fewer letters leaves out the pictures at equal time, then all but the middle of each.
+    let summary = write(folder.path()).unwrap().summary;
+    let viewer = |letters| viewer::html(folder.path(), &summary, &summary.pictured[0], letters).unwrap();
+    let count = |html: &str| html.matches("class=\"picture\"").count();
+    let whole = viewer(viewer::MOST_LETTERS);
+    let some = viewer(whole.len() - 1);
+    let middle = viewer(some.len() * 2 / 3);
+    assert_eq!([count(&whole), count(&some), count(&middle)], [4, 3, 3]);
+    assert!(whole.contains("data-note=\"\"") && some.contains("data-note=\"The pictures at equal time are left out"));
+    assert!(middle.contains("data-note=\"Of 88 × 30 pixels the middle is here") && middle.len() <= some.len() * 2 / 3);
+    // Another folder of the same rows and images has the same bytes; one without images or an earlier page says so.
+    write(folder.path()).unwrap();
+    assert!(std::fs::read_to_string(&path).unwrap() == page);
+    std::fs::remove_dir_all(folder.path().join("images")).unwrap();
+    let hostile = page.replace("data-label=\"reference\"", "data-label=\"<b>reference</b>\"");
+    for earlier in [None, Some(hostile), Some(page.replace("<!-- viewer ", "<!-- viewer 0"))] {
+        match &earlier {
+            None => std::fs::remove_file(&path).unwrap(),
+            Some(earlier) => std::fs::write(&path, earlier).unwrap(),
+        }
+        write(folder.path()).unwrap();
+        let page = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(page.matches("The flip viewer has no pictures here.").count(), 2);
+        assert!(!page.contains("<b>reference"));
+    }
 }
 
 #[test]

@@ -12,7 +12,7 @@ use super::figure::{Figure, Rgb8};
 use super::sections::Measurements;
 use super::shots::PictureSet;
 use super::summarise::{Summary, summarise};
-use super::{charts, pictured, provenance, sections, spectra, stability, tables};
+use super::{charts, page, pictured, provenance, sections, spectra, stability, tables};
 
 /// What became of a figure.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -74,7 +74,7 @@ fn details_path(dir: &Path) -> PathBuf {
     dir.join("figures").join("details.txt")
 }
 
-/// Writes `report.md`, `summary.csv`, `slopes.csv`, where it is asked about `stability.csv`, and `figures/` from the rows in
+/// Writes `report.md`, `report.html`, `summary.csv`, `slopes.csv`, where it is asked about `stability.csv`, and `figures/` from the rows in
 /// `dir`.
 ///
 /// The same rows, timings and images give the same bytes; `summary.csv` and `slopes.csv` depend on rows alone.
@@ -99,7 +99,9 @@ pub fn write(dir: &Path) -> Result<Written> {
         write_whole(&dir.join("stability.csv"), stability::csv(&summary).as_bytes())?;
     }
     let report = dir.join("report.md");
-    write_whole(&report, sections::report_with(&summary, &figures, &measured).as_bytes())?;
+    let text = sections::report_with(&summary, &figures, &measured);
+    write_whole(&report, text.as_bytes())?;
+    page::write(dir, &summary, &text)?;
     Ok(Written { report, summary, figures })
 }
 
