@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 
 pub use pfm::write_pfm;
 pub use picture::{MAX_PIXELS, PICTURE_PIXEL_BYTES, Picture, read_picture};
-pub use screen::{DEFAULT_EXPOSURE, screen_light, srgb_decode, srgb_encode, to_screen, tone_map};
+pub use screen::{DEFAULT_EXPOSURE, ScreenTable, screen_light, srgb_decode, srgb_encode, to_screen, tone_map};
 
 /// Linear radiance, `f32` RGB, top row first: `pixels[y * width + x]`.
 #[derive(Debug, Clone, PartialEq)]
@@ -97,6 +97,15 @@ const ATTRIBUTE_PREFIX: &str = "sampler_lab.";
 /// # Errors
 /// Kind `Write` where the file cannot be written.
 pub fn write_exr(path: &Path, image: &Image, provenance: &[(String, String)]) -> Result<()> {
+    let bytes = exr_bytes(image, provenance).map_err(|e| Error::write(path, format!("cannot encode EXR: {e}")))?;
+    write_renamed(path, &bytes, false)
+}
+
+/// The bytes of the file that [`write_exr`] writes.
+///
+/// # Errors
+/// What the encoder says.
+pub fn exr_bytes(image: &Image, provenance: &[(String, String)]) -> std::result::Result<Vec<u8>, String> {
     let size = Vec2(image.width as usize, image.height as usize);
     let channels = SpecificChannels::rgb(|at: Vec2<usize>| {
         let [r, g, b] = image.pixels[at.y() * image.width as usize + at.x()];
@@ -114,10 +123,8 @@ pub fn write_exr(path: &Path, image: &Image, provenance: &[(String, String)]) ->
     file.write()
         .non_parallel()
         .to_buffered(&mut bytes)
-        .map_err(|e| Error::write(path, format!("cannot encode EXR: {e}")))?;
-    let bytes = with_sorted_attributes(bytes.into_inner())
-        .ok_or_else(|| Error::write(path, "cannot encode EXR: its header does not read back"))?;
-    write_renamed(path, &bytes, false)
+        .map_err(|e| e.to_string())?;
+    with_sorted_attributes(bytes.into_inner()).ok_or_else(|| "its header does not read back".to_owned())
 }
 
 /// Puts the attributes of a single-part OpenEXR file into the order of their names.
@@ -187,6 +194,15 @@ pub fn read_exr(path: &Path) -> Result<(Image, Vec<(String, String)>)> {
 /// # Errors
 /// Kind `Write` where the file cannot be written.
 pub fn write_png_rgb8(path: &Path, width: u32, height: u32, bytes: &[u8]) -> Result<()> {
+    let png = png_rgb8_bytes(width, height, bytes).map_err(|e| Error::write(path, format!("cannot encode PNG: {e}")))?;
+    write_whole(path, &png)
+}
+
+/// The bytes of the file that [`write_png_rgb8`] writes.
+///
+/// # Errors
+/// What the encoder says.
+pub fn png_rgb8_bytes(width: u32, height: u32, bytes: &[u8]) -> std::result::Result<Vec<u8>, String> {
     use image::ImageEncoder;
     use image::codecs::png::{CompressionType, FilterType, PngEncoder};
     // Pictures compress better with row filters, charts without: the smaller is kept.
@@ -194,12 +210,11 @@ pub fn write_png_rgb8(path: &Path, width: u32, height: u32, bytes: &[u8]) -> Res
         let mut png = Vec::new();
         PngEncoder::new_with_quality(&mut png, CompressionType::Best, filter)
             .write_image(bytes, width, height, image::ExtendedColorType::Rgb8)
-            .map_err(|e| Error::write(path, format!("cannot encode PNG: {e}")))?;
-        Ok(png)
+            .map_err(|e| e.to_string())?;
+        Ok::<_, String>(png)
     };
     let (filtered, plain) = (encoded(FilterType::Adaptive)?, encoded(FilterType::NoFilter)?);
-    let png = if plain.len() < filtered.len() { plain } else { filtered };
-    write_whole(path, &png)
+    Ok(if plain.len() < filtered.len() { plain } else { filtered })
 }
 
 /// Writes a tone-mapped PNG.

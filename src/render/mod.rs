@@ -4,9 +4,11 @@
 
 mod direct;
 mod lanes;
+mod progressive;
 mod tiles;
 
 pub use direct::light_contribution;
+pub use progressive::{Growing, Pass};
 pub use tiles::{NonFinite, Rendered, render, render_observed, render_sample, render_while};
 
 use crate::accel;
