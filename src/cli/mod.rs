@@ -249,6 +249,10 @@ impl Config {
                 for warning in &loaded.warnings {
                     say(format_args!("note: {warning}"));
                 }
+                if let Some(sampler) = &loaded.config.sampler {
+                    SamplerSet::parse(sampler, Preset::Best)
+                        .map_err(|e| Error::input(format!("{}: sampler", args.file.display()), e))?;
+                }
                 let framebuffer = loaded.config.framebuffer;
                 let triangles = loaded.mesh.len();
                 let scene =
