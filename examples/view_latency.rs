@@ -36,12 +36,7 @@ fn main() {
         let mut page = Page::open(&address);
         let (first, blocks) = page.changes_from_rest();
         let (rate, gaps) = page.flight();
-        println!(
-            "{width}x{height}  {}  {:>12}  | {rate:>23.1}   {}",
-            spread(first),
-            blocks,
-            spread(gaps)
-        );
+        println!("{width}x{height}  {}  {:>12}  | {rate:>23.1}   {}", spread(first), blocks, spread(gaps));
         stop.store(true, Ordering::Relaxed);
         drop(page);
         let _ = serving.join();
@@ -144,7 +139,9 @@ impl Page {
             let due = (started.elapsed().as_secs_f64() * 60.0) as u32;
             if due >= told {
                 let x = -0.565_43 + 0.5 * libm::sin(f64::from(due) / 60.0);
-                self.say(&json!({"ask": "set", "sets": [format!("camera.pos=[{x}, 3.2923, -4.4922]")], "moving": true}));
+                self.say(
+                    &json!({"ask": "set", "sets": [format!("camera.pos=[{x}, 3.2923, -4.4922]")], "moving": true}),
+                );
                 told = due + 1;
             }
             let before = self.epoch;

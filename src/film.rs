@@ -120,10 +120,7 @@ pub fn exr_bytes(image: &Image, provenance: &[(String, String)]) -> std::result:
     let encoding = Encoding { compression: Compression::ZIP16, ..Encoding::default() };
     let file = exr::prelude::Image::from_layer(Layer::new(size, layer, encoding, channels));
     let mut bytes = Cursor::new(Vec::new());
-    file.write()
-        .non_parallel()
-        .to_buffered(&mut bytes)
-        .map_err(|e| e.to_string())?;
+    file.write().non_parallel().to_buffered(&mut bytes).map_err(|e| e.to_string())?;
     with_sorted_attributes(bytes.into_inner()).ok_or_else(|| "its header does not read back".to_owned())
 }
 
@@ -194,7 +191,8 @@ pub fn read_exr(path: &Path) -> Result<(Image, Vec<(String, String)>)> {
 /// # Errors
 /// Kind `Write` where the file cannot be written.
 pub fn write_png_rgb8(path: &Path, width: u32, height: u32, bytes: &[u8]) -> Result<()> {
-    let png = png_rgb8_bytes(width, height, bytes).map_err(|e| Error::write(path, format!("cannot encode PNG: {e}")))?;
+    let png =
+        png_rgb8_bytes(width, height, bytes).map_err(|e| Error::write(path, format!("cannot encode PNG: {e}")))?;
     write_whole(path, &png)
 }
 

@@ -128,7 +128,17 @@ impl Section {
     /// The keys that mean something here.
     fn keys(self) -> &'static [&'static str] {
         match self {
-            Self::Top => &["camera", "auto_focus", "framebuffer", "scene", "algorithm", "shading", "estimator", "sampler", "seed"],
+            Self::Top => &[
+                "camera",
+                "auto_focus",
+                "framebuffer",
+                "scene",
+                "algorithm",
+                "shading",
+                "estimator",
+                "sampler",
+                "seed",
+            ],
             Self::Camera => &["pos", "dir", "up", "fov", "lens_radius", "focal_depth"],
             Self::Framebuffer => &["res_w", "res_h", "sppx", "exposure"],
             Self::Scene => &["mesh_files", "materials", "sky", "volume"],
@@ -711,17 +721,19 @@ mod tests {
             .prop_map(|n| n.map(|n| (Section::Camera, "rr_depth".to_owned(), Value::integer(n))).into_iter().collect());
         let open = (prop::option::of(".{0,9}"), prop::option::of(any::<u64>()));
         (camera, any::<bool>(), framebuffer, files, patches, shading, (estimator, open), kept).prop_map(
-            |(camera, auto_focus, framebuffer, mesh_files, materials, shading, (estimator, open), unmodelled)| SceneConfig {
-                camera,
-                auto_focus,
-                framebuffer,
-                mesh_files,
-                materials,
-                shading,
-                estimator,
-                sampler: open.0,
-                seed: open.1,
-                unmodelled,
+            |(camera, auto_focus, framebuffer, mesh_files, materials, shading, (estimator, open), unmodelled)| {
+                SceneConfig {
+                    camera,
+                    auto_focus,
+                    framebuffer,
+                    mesh_files,
+                    materials,
+                    shading,
+                    estimator,
+                    sampler: open.0,
+                    seed: open.1,
+                    unmodelled,
+                }
             },
         )
     }

@@ -126,7 +126,8 @@ pub struct PointSet {
 /// Measures sets and tells them with their points: the first two coordinates of each.
 pub fn points(title: &Value, sets: Vec<PointSet>, outbox: &Outbox) {
     let told = sets.into_iter().map(|set| {
-        let shown: Vec<Vec<f64>> = set.coordinates.chunks(set.dimension).map(|p| p.iter().copied().take(2).collect()).collect();
+        let shown: Vec<Vec<f64>> =
+            set.coordinates.chunks(set.dimension).map(|p| p.iter().copied().take(2).collect()).collect();
         let measured = Points::new(set.dimension, set.coordinates).map_err(|e| e.to_string()).and_then(|points| {
             let exact = measure(&set.source, &points, Options { star_cost: Some(STAR_COST) });
             // Without the exact star discrepancy where it would take too long; the page says that it is left out.

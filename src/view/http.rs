@@ -141,9 +141,12 @@ fn answer(request: &Request, house: &House) -> Result<Answer, Refusal> {
     let forbidden = |what: &str| ("403 Forbidden", what.to_owned());
     let host = request.host.as_deref().unwrap_or("");
     // The name alone: a tunnel may have another port at its far end. Another name is another site's that points here.
-    let name = host.rsplit_once(':').filter(|(_, port)| port.bytes().all(|b| b.is_ascii_digit())).map_or(host, |(n, _)| n);
+    let name =
+        host.rsplit_once(':').filter(|(_, port)| port.bytes().all(|b| b.is_ascii_digit())).map_or(host, |(n, _)| n);
     if !["127.0.0.1", "localhost", "[::1]"].contains(&name) {
-        return Err(forbidden("expected the host 127.0.0.1 or localhost, found another: open the address that was printed"));
+        return Err(forbidden(
+            "expected the host 127.0.0.1 or localhost, found another: open the address that was printed",
+        ));
     }
     if request.method != "GET" {
         return Err(("405 Method Not Allowed", format!("expected GET, found {}", request.method)));

@@ -239,7 +239,10 @@ mod tests {
         whole.extend(header);
         whole.extend(b"v 0 0 0");
         let upload = Upload::parse(&whole).unwrap();
-        assert_eq!((upload.drop, upload.name.as_str(), upload.is_last, upload.bytes), (1, "a.obj", true, &b"v 0 0 0"[..]));
+        assert_eq!(
+            (upload.drop, upload.name.as_str(), upload.is_last, upload.bytes),
+            (1, "a.obj", true, &b"v 0 0 0"[..])
+        );
         for cut in 0..4 + header.len() {
             assert!(Upload::parse(&whole[..cut]).is_err(), "{cut}");
         }

@@ -40,13 +40,9 @@ pub fn on_screen(image: &Image, table: &ScreenTable, view: View) -> Shown {
 pub fn error(growing: &Growing, reference: &Image, scale: f64, table: &ScreenTable) -> Shown {
     let image = growing.image();
     match error_map(&image, reference, scale) {
-        Ok(map) => Shown {
-            width: map.width,
-            height: map.height,
-            bytes: map.bytes,
-            view: View::Error,
-            scale: Some(scale),
-        },
+        Ok(map) => {
+            Shown { width: map.width, height: map.height, bytes: map.bytes, view: View::Error, scale: Some(scale) }
+        }
         Err(_) => on_screen(&image, table, View::Image),
     }
 }

@@ -91,7 +91,9 @@ fn listen(stream: TcpStream, house: &House, outbox: &Outbox, inbox: &Inbox, uplo
                 continue;
             }
             Err(SocketError::Capacity(e)) => {
-                outbox.say(&json!({"is": "refused", "text": format!("message: expected one of bounded size, found: {e}")}));
+                outbox.say(
+                    &json!({"is": "refused", "text": format!("message: expected one of bounded size, found: {e}")}),
+                );
                 break;
             }
             Err(_) => break,

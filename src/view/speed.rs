@@ -39,7 +39,8 @@ impl Speed {
     /// Takes a picture that was sent and acknowledged into account. Short ways are latency more than width, and count as fast.
     pub fn sent(&mut self, bytes: usize, took: Duration) {
         let rate = bytes as f64 / took.as_secs_f64().max(1e-3);
-        self.bytes_per_second = if bytes > 50_000 { 0.5 * (self.bytes_per_second + rate) } else { self.bytes_per_second.max(rate) };
+        self.bytes_per_second =
+            if bytes > 50_000 { 0.5 * (self.bytes_per_second + rate) } else { self.bytes_per_second.max(rate) };
     }
 
     /// Samples a second.
@@ -80,7 +81,9 @@ mod tests {
             speed.traced(10_000_000, 20_000_000, Duration::from_millis(100));
             speed.sent(2_764_800, Duration::from_millis(5));
         }
-        assert!((speed.samples_per_second() / 1e8 - 1.0).abs() < 0.01 && (speed.rays_per_second() / 2e8 - 1.0).abs() < 0.01);
+        assert!(
+            (speed.samples_per_second() / 1e8 - 1.0).abs() < 0.01 && (speed.rays_per_second() / 2e8 - 1.0).abs() < 0.01
+        );
         assert_eq!(speed.first_block(1280 * 720, 1), 1);
         assert_eq!(speed.first_block(1280 * 720, 3), 2);
         assert_eq!(speed.samples_of_a_pass(1280 * 720), 6);

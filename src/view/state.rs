@@ -20,10 +20,8 @@ pub fn vocabulary(can_save: bool) -> Value {
         }
     }
     let legal: Vec<String> = every_legal_spec().iter().map(SamplerSpec::to_string).collect();
-    let decisions: Vec<Value> = Decision::ALL
-        .iter()
-        .map(|d| json!({"key": d.key(), "name": d.name(), "dimensions": d.dimensions()}))
-        .collect();
+    let decisions: Vec<Value> =
+        Decision::ALL.iter().map(|d| json!({"key": d.key(), "name": d.name(), "dimensions": d.dimensions()})).collect();
     json!({
         "is": "hello", "version": env!("CARGO_PKG_VERSION"), "presets": presets, "legal": legal, "decisions": decisions,
         "most_pixels": MAX_VIEW_PIXELS, "most_samples": MAX_SAMPLES, "can_save": can_save,

@@ -60,6 +60,8 @@ pub struct Studio {
     sides: Vec<Side>,
     reference: Option<Reference>,
     refines: bool,
+    /// Whether something was asked for that only a reference can tell: its first samples come first then.
+    wants_truth: bool,
     stopped: bool,
     /// A sample that is no number, which ends the picture.
     broken: Option<String>,
@@ -99,8 +101,7 @@ impl Studio {
     /// A worker that has done nothing yet.
     pub fn new(house: Arc<House>, inbox: Arc<Inbox>, outbox: Arc<Outbox>) -> Self {
         let now = Instant::now();
-        let show =
-            Showing { sent: 0, at: now, bytes: 0, acknowledged: 0, is_stale: true, is_urgent: true };
+        let show = Showing { sent: 0, at: now, bytes: 0, acknowledged: 0, is_stale: true, is_urgent: true };
         Self {
             house,
             inbox,
@@ -110,6 +111,7 @@ impl Studio {
             sides: Vec::new(),
             reference: None,
             refines: true,
+            wants_truth: false,
             stopped: false,
             broken: None,
             view: View::Image,
@@ -233,9 +235,15 @@ impl Studio {
         }
         self.show.is_urgent = false;
         let all_finished = self.sides.iter().all(Side::is_finished);
-        // While pictures are made, the reference takes a quarter of the passes of a camera that rests.
-        let turn = all_finished || (self.passes % 4 == 3 && self.sides.iter().all(|s| !s.is_timing()));
-        if turn && self.refines && self.changed.elapsed() >= REST && !self.reference.as_ref().is_some_and(Reference::is_finished) {
+        // While pictures are made, the reference takes a quarter of the passes of a camera that rests, half where it is looked at.
+        let known = self.reference.as_ref().map_or(0, Reference::samples);
+        let is_due = match self.wants_truth {
+            true => known == 0 || self.passes % 2 == 1,
+            false => self.passes % 4 == 3,
+        };
+        let turn = all_finished || (is_due && self.sides.iter().all(|s| !s.is_timing()));
+        let rests = self.changed.elapsed() >= REST;
+        if turn && self.refines && rests && !self.reference.as_ref().is_some_and(Reference::is_finished) {
             let reference = match &mut self.reference {
                 Some(reference) => reference,
                 none => match Reference::new(&open.scene, None) {

@@ -97,11 +97,13 @@ impl Uploads {
         let place = format!("upload {name:?}");
         let (files, bytes) = (self.files + 1, self.bytes + upload.bytes.len());
         if files > MAX_UPLOAD_FILES {
-            let what = format!("expected at most {MAX_UPLOAD_FILES} files of a tab, found another (reload to begin anew)");
+            let what =
+                format!("expected at most {MAX_UPLOAD_FILES} files of a tab, found another (reload to begin anew)");
             return Err(Error::input(place, what));
         }
         if upload.bytes.len() > MAX_UPLOAD_BYTES || bytes > MAX_UPLOAD_TOTAL {
-            let what = format!("expected {MAX_UPLOAD_BYTES} bytes at most, and {MAX_UPLOAD_TOTAL} of all files of a tab");
+            let what =
+                format!("expected {MAX_UPLOAD_BYTES} bytes at most, and {MAX_UPLOAD_TOTAL} of all files of a tab");
             return Err(Error::input(place, format!("{what}, found {} more", upload.bytes.len())));
         }
         if self.open.as_ref().is_none_or(|(number, ..)| *number != upload.drop) {
@@ -157,7 +159,10 @@ fn write_new(path: &Path, bytes: &[u8]) -> Result<()> {
 /// Kind `Input` for absolute names, `..`, hidden files, control characters, devices' colons, and names above 200 bytes or 4 folders.
 fn checked_name(name: &str) -> Result<String> {
     let plain = |part: &str| {
-        !part.is_empty() && !part.starts_with('.') && !part.contains(['\\', ':', '\0']) && !part.chars().any(char::is_control)
+        !part.is_empty()
+            && !part.starts_with('.')
+            && !part.contains(['\\', ':', '\0'])
+            && !part.chars().any(char::is_control)
     };
     let parts: Vec<&str> = name.split('/').collect();
     if name.len() <= 200 && parts.len() <= 5 && parts.iter().all(|part| plain(part)) {
@@ -177,9 +182,22 @@ mod tests {
             assert_eq!(checked_name(good).unwrap(), good);
         }
         let long = "a".repeat(201);
-        for bad in
-            ["", "..", "../a", "a/../b", "/etc/passwd", "a//b", ".hidden", "a/.b", "C:a", "a\\b", "a\0b", "a\nb", "a/", &long]
-        {
+        for bad in [
+            "",
+            "..",
+            "../a",
+            "a/../b",
+            "/etc/passwd",
+            "a//b",
+            ".hidden",
+            "a/.b",
+            "C:a",
+            "a\\b",
+            "a\0b",
+            "a\nb",
+            "a/",
+            &long,
+        ] {
             assert!(checked_name(bad).is_err(), "{bad:?}");
         }
     }

@@ -5,7 +5,7 @@ import { number } from "./screen.js";
 
 /** A sharp canvas of so many CSS pixels. */
 function canvas(width, height, label) {
-  const element = make("canvas", { ariaLabel: label, role: "img" });
+  const element = make("canvas", { ariaLabel: label });
   element.setAttribute("role", "img");
   const scale = window.devicePixelRatio || 1;
   [element.width, element.height] = [width * scale, height * scale];
@@ -33,7 +33,7 @@ export function pointSet({ source, points, measured, error }) {
     context.fill();
   });
   const rows = make("tbody");
-  const tell = (name, value) => rows.append(make("tr", {}, make("td", { textContent: name }), make("td", { textContent: value })));
+  const tell = (name, value) => rows.append(make("tr", {}, make("th", { scope: "row", textContent: name }), make("td", { textContent: value })));
   if (error) tell("not measured", error);
   if (measured) {
     tell("star discrepancy D*", measured.star ? number(measured.star.value) : "takes too long here");
@@ -93,7 +93,7 @@ export function spectrum(panels, reference) {
     const key = make("span", { textContent: i === 0 ? "━ " : "╍ " });
     key.style.color = COLOURS[i];
     const share = (v) => (v == null ? "–" : `${(100 * v).toPrecision(3)} %`);
-    rows.append(make("tr", {}, make("td", {}, key, `${sampler}, ${samples} spp`), make("td", { textContent: `low-frequency share ${share(s.low_share?.value)}; white noise ${share(s.white_low_share)}` })));
+    rows.append(make("tr", {}, make("th", { scope: "row" }, key, `${sampler}, ${samples} spp`), make("td", { textContent: `low-frequency share ${share(s.low_share?.value)}; white noise ${share(s.white_low_share)}` })));
   });
   return make("div", {}, element, make("table", {}, rows),
     make("p", { className: "hint", textContent: `Power in squared radiance; dotted: white noise of the same mean square error. Reference 2 × ${reference} spp.` }));

@@ -37,6 +37,9 @@ export class Screen {
       this.context.imageSmoothingEnabled = true;
       this.context.drawImage(this.small, 0, 0, width * panel.block, height * panel.block);
     }
+    // Enlarged, pixels stay squares; reduced, they are averaged.
+    const box = this.canvas.getBoundingClientRect();
+    this.canvas.classList.toggle("smooth", Math.min(box.width / full[0], box.height / full[1]) < 1);
     this.describe(panel);
   }
 
@@ -58,8 +61,11 @@ export class Screen {
   /** The pixel under a mouse event, or null. */
   pixelAt(event) {
     const box = this.canvas.getBoundingClientRect();
-    const x = Math.floor(((event.clientX - box.left) / box.width) * this.full[0]);
-    const y = Math.floor(((event.clientY - box.top) / box.height) * this.full[1]);
+    const [w, h] = this.full;
+    // The picture is fitted into the canvas's box, in its middle.
+    const scale = Math.min(box.width / w, box.height / h);
+    const x = Math.floor((event.clientX - box.left - (box.width - scale * w) / 2) / scale);
+    const y = Math.floor((event.clientY - box.top - (box.height - scale * h) / 2) / scale);
     return x >= 0 && y >= 0 && x < this.full[0] && y < this.full[1] ? { x, y } : null;
   }
 }

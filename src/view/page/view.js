@@ -10,7 +10,7 @@ import { Screen, many, number } from "./screen.js";
 
 const $ = (selector) => document.querySelector(selector);
 const screens = [new Screen("a"), new Screen("b")];
-let samplers, configs, picked, flipped = 0, panels = 1, latest;
+let samplers, configs, picked, flipped = 0, panels = 1, latest, spectral = 0;
 
 function say(text, good = false) {
   $("#message").hidden = !text;
@@ -57,6 +57,7 @@ const link = new Link(
         from += size;
       });
       arrange();
+      if (document.body.dataset.frame === undefined && document.activeElement === document.body) screens[0].canvas.focus({ preventScroll: true });
       link.ask("shown", { frame: frame.frame });
       Object.assign(document.body.dataset, { frame: frame.frame, epoch: frame.epoch, samples: frame.panels[0].samples });
     },
@@ -71,8 +72,11 @@ const link = new Link(
       $("#points-out").replaceChildren(make("p", { textContent: title }), ...sets.map(pointSet));
       $("#points-out").scrollIntoView({ block: "nearest" });
     },
-    spectrum({ panels, reference_samples }) {
-      $("#spectrum-out").replaceChildren(spectrum(panels, reference_samples));
+    spectrum({ panels, reference_samples, wait }) {
+      if (!spectral) return;
+      const out = wait ? make("p", { className: "hint", textContent: wait }) : spectrum(panels, reference_samples);
+      $("#spectrum-out").replaceChildren(out);
+      spectral = setTimeout(() => link.ask("spectrum"), wait ? 700 : 4000);
     },
     saved: ({ name }) => say(`Saved as ${name}.`, true),
     file: offer,
@@ -126,7 +130,7 @@ function arrange() {
 }
 
 function row(name, values, title = "") {
-  return make("tr", { title }, make("td", { textContent: name }), ...values.map((value) => make("td", { textContent: value })));
+  return make("tr", { title }, make("th", { scope: "row", textContent: name }), ...values.map((value) => make("td", { textContent: value })));
 }
 
 function showStatus(status) {
@@ -218,13 +222,10 @@ for (const screen of screens) {
   });
   canvas.addEventListener("wheel", (event) => {
     event.preventDefault();
-    $("#speed").textContent = number(flight.faster(-Math.sign(event.deltaY)));
-    say(`Speed: ${number(flight.speed)} units a second.`, true);
+    faster(-Math.sign(event.deltaY));
   }, { passive: false });
-  canvas.addEventListener("keydown", (event) => onKey(event));
-  canvas.addEventListener("keyup", (event) => flight.release(event.code));
-  canvas.addEventListener("blur", () => flight.releaseAll());
 }
+addEventListener("keyup", (event) => flight.release(event.code));
 addEventListener("blur", () => flight.releaseAll());
 
 function pick(pixel) {
@@ -240,34 +241,48 @@ function look(index) {
   link.ask("look", { view: radio.value });
 }
 
-function onKey(event) {
-  if (event.ctrlKey || event.altKey || event.metaKey) return;
-  if (flight.press(event.code)) event.preventDefault();
-  else if (event.code === "KeyX") {
-    flipped = 1 - flipped;
-    const there = document.activeElement?.tagName === "CANVAS";
-    arrange();
-    if (there) screens[flipped].canvas.focus();
-  } else if (event.code === "KeyP") askPoints();
-  else if (event.code === "Enter") pick(under ?? middle());
-  else if (event.key === "+" || event.key === "-") $("#speed").textContent = number(flight.faster(event.key === "+" ? 1 : -1));
-  else if (/^[1-4]$/.test(event.key)) look(Number(event.key) - 1);
-}
+const CONTROLS = "input, select, button, summary, textarea";
+const TEXTS = "input:not([type=radio], [type=checkbox], [type=range], [type=file]), select, textarea";
 
-// Space and Escape anywhere but in a control that has its own use for them.
+// Letters and digits anywhere but where one types; keys that controls use only outside of them.
 addEventListener("keydown", (event) => {
-  const isControl = event.target.closest?.("input, select, button, summary, textarea");
+  const within = (list) => event.target.closest?.(list);
+  if (event.ctrlKey || event.altKey || event.metaKey) return;
   if (event.code === "Escape") {
     const open = $("nav details[open]");
     if (open) {
       open.open = false;
       open.querySelector("summary").focus();
     } else link.ask("stop");
-  } else if (event.code === "Space" && !isControl) {
+    return;
+  }
+  if (within(TEXTS)) return;
+  const isOwn = /^(Arrow|Space|Enter)/.test(event.code);
+  if (isOwn && within(CONTROLS)) return;
+  if (flight.press(event.code)) event.preventDefault();
+  else if (event.code === "Space") {
     event.preventDefault();
     link.ask("restart");
-  }
+  } else if (event.repeat) return;
+  else if (event.code === "KeyX") flip();
+  else if (event.code === "KeyP") askPoints();
+  else if (event.code === "Enter") pick(under ?? middle());
+  else if (event.key === "+" || event.key === "-") faster(event.key === "+" ? 1 : -1);
+  else if (/^[1-4]$/.test(event.key)) look(Number(event.key) - 1);
 });
+
+function flip() {
+  flipped = 1 - flipped;
+  const there = document.activeElement?.tagName === "CANVAS";
+  arrange();
+  if (there) screens[screens[flipped].figure.hidden ? 0 : flipped].canvas.focus();
+}
+
+function faster(steps) {
+  $("#speed").textContent = number(flight.faster(steps));
+  say(`Speed: ${number(flight.speed)} units a second.`, true);
+}
+
 // A click elsewhere closes an open panel.
 addEventListener("pointerdown", (event) => {
   const open = $("nav details[open]");
@@ -280,4 +295,11 @@ $("#restart").onclick = () => link.ask("restart");
 $("#stop").onclick = () => link.ask("stop");
 $("#refine").onchange = (event) => link.ask("reference", { on: event.target.checked });
 $("#points-go").onclick = askPoints;
-$("#spectrum-go").onclick = () => link.ask("spectrum");
+$("#spectrum-go").onclick = () => {
+  clearTimeout(spectral);
+  spectral = spectral ? 0 : 1;
+  $("#spectrum-go").setAttribute("aria-pressed", String(spectral > 0));
+  $("#spectrum-go").textContent = spectral ? "Hide" : "Show";
+  if (spectral) link.ask("spectrum");
+  else $("#spectrum-out").replaceChildren();
+};

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::super::analyst::{self, MAX_POINTS, PointSet};
 use super::super::document::Document;
-use super::super::message::{Ask, Download};
+use super::super::message::{Ask, Download, View};
 use super::super::side::Side;
 use super::{Open, Studio};
 use crate::error::{Error, Result};
@@ -53,6 +53,7 @@ impl Studio {
             }
             Ask::Look { view } => {
                 self.view = view;
+                self.wants_truth = matches!(view, View::Reference | View::Error);
                 self.show.is_stale = true;
                 Ok(())
             }
@@ -146,7 +147,8 @@ impl Studio {
             return Err(Error::input("points", format!("expected a decision ({keys}), found {decision:?}")));
         };
         if scene.layout.find(decision).is_none() {
-            let what = format!("expected a decision that the scene makes ({}), found {}", scene.layout, decision.name());
+            let what =
+                format!("expected a decision that the scene makes ({}), found {}", scene.layout, decision.name());
             return Err(Error::input("points", what));
         }
         let sets = self.sides.iter().map(|side| set_of(side, scene, PixelKey::new(x, y), decision)).collect();
@@ -156,11 +158,13 @@ impl Studio {
     }
 
     fn spectrum(&mut self) -> Result<()> {
+        self.wants_truth = true;
         let halves = self.reference.as_ref().and_then(|reference| reference.images());
         let is_ready = !self.sides.is_empty() && self.sides.iter().all(|side| side.growing.samples() > 0);
         let (Some(halves), true) = (halves, is_ready) else {
-            let what = "expected a picture and a reference with a sample in every pixel, found none yet: wait a moment";
-            return Err(Error::input("spectrum", what));
+            let wait = "Waiting for a reference with a sample in every pixel.";
+            self.outbox.say(&json!({"is": "spectrum", "panels": [], "wait": wait}));
+            return Ok(());
         };
         let panel = |side: &Side| (side.set.to_string(), side.growing.image(), side.growing.samples());
         let panels: Vec<_> = self.sides.iter().map(panel).collect();
@@ -262,7 +266,8 @@ impl Studio {
         };
         let found = read_csv_file(&folder.join(name)).map_err(|e| Error { place: name.clone(), ..e })?;
         if found.n() > MAX_POINTS {
-            let what = format!("expected at most {MAX_POINTS} points, found {} (remedy: `sampler-lab measure`)", found.n());
+            let what =
+                format!("expected at most {MAX_POINTS} points, found {} (remedy: `sampler-lab measure`)", found.n());
             return Err(Error::input(name, what));
         }
         let coordinates = found.iter().flatten().copied().collect();
@@ -275,7 +280,8 @@ impl Studio {
 }
 
 fn read(folder: &Path, name: &str) -> Result<Vec<u8>> {
-    std::fs::read(folder.join(name)).map_err(|e| Error::input(name, format!("expected the file that was dropped, found: {e}")))
+    std::fs::read(folder.join(name))
+        .map_err(|e| Error::input(name, format!("expected the file that was dropped, found: {e}")))
 }
 
 /// A name as messages show it.
