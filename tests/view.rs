@@ -264,18 +264,18 @@ fn a_picture_that_grows_ends_with_the_bits_of_render() {
                 "{text} {blocks:?}"
             );
         }
-        assert_eq!(growing.begin_stopped(&scene, &sampler), Pass::Stopped);
-    }
-}
-
-/// A pass that is told to stop at once.
-trait BeginStopped {
-    fn begin_stopped<S: PointSource>(&self, scene: &Scene, source: &S) -> Pass;
-}
-
-impl BeginStopped for Growing {
-    fn begin_stopped<S: PointSource>(&self, scene: &Scene, source: &S) -> Pass {
-        Growing::new(self.size()).begin(scene, source, 1, &|| false).unwrap()
+        // One that is stopped has no sample, and begins anew.
+        if sampler.samples() > 1 {
+            growing.clear(size);
+            growing.begin(&scene, &sampler, 1, &|| true).unwrap();
+            assert_eq!(growing.add(&scene, &sampler, sampler.samples(), &|| false).unwrap(), Pass::Stopped);
+            assert_eq!((growing.samples(), growing.block()), (0, None));
+            assert_eq!(growing.begin(&scene, &sampler, 2, &|| false).unwrap(), Pass::Stopped);
+            assert_eq!(growing.block(), None);
+            growing.begin(&scene, &sampler, 1, &|| true).unwrap();
+            growing.add(&scene, &sampler, sampler.samples(), &|| true).unwrap();
+            assert_eq!(growing.image(), whole.image, "{text}");
+        }
     }
 }
 

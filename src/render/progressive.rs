@@ -49,7 +49,7 @@ pub enum Pass {
         /// Camera and shadow rays.
         rays: u64,
     },
-    /// Told to stop: some pixels have the samples and others do not, so the picture has to be begun anew.
+    /// Told to stop: some pixels had the samples already and others had not, so the picture has none again.
     Stopped,
 }
 
@@ -95,7 +95,7 @@ impl Growing {
     /// `go_on` is asked after each few pixels, from several threads.
     ///
     /// # Errors
-    /// A sample whose radiance is not finite; the picture has to be begun anew.
+    /// A sample whose radiance is not finite; the picture has none again.
     ///
     /// # Panics
     /// Where every pixel has its sample, or `block` is no proper divisor of the blocks so far.
@@ -110,11 +110,11 @@ impl Growing {
         assert!(self.done == 0 && block > 0 && block != known && known.is_multiple_of(block), "{block} after {known}");
         let on = |p: u32, side: u32| side > 0 && p.is_multiple_of(side);
         let wanted = |x: u32, y: u32| on(x, block) && on(y, block) && !(on(x, known) && on(y, known));
+        // What a pass leaves behind when it ends early counts for nothing.
+        (self.done, self.block) = (0, 0);
         let pass = self.pass(scene, source, 0..1, &wanted, go_on)?;
-        if block == 1 {
-            (self.done, self.block) = (1, 0);
-        } else {
-            self.block = block;
+        if pass != Pass::Stopped {
+            (self.done, self.block) = if block == 1 { (1, 0) } else { (0, block) };
         }
         Ok(pass)
     }
@@ -135,8 +135,12 @@ impl Growing {
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Pass, NonFinite> {
         assert!(self.block == 0 && to > self.done && to <= source.samples(), "samples {}..{to}", self.done);
-        let pass = self.pass(scene, source, self.done..to, &|_, _| true, go_on)?;
-        self.done = to;
+        let samples = self.done..to;
+        self.done = 0;
+        let pass = self.pass(scene, source, samples, &|_, _| true, go_on)?;
+        if pass != Pass::Stopped {
+            self.done = to;
+        }
         Ok(pass)
     }
 

@@ -38,6 +38,22 @@ pub struct OpenOptions {
     pub sets: Vec<String>,
 }
 
+/// How large a scene of [`open_within`] may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Triangles of all its meshes.
+    pub triangles: usize,
+    /// Texels of all its textures.
+    pub texels: u64,
+}
+
+/// What a scene may read, and how much.
+struct Within {
+    /// The folders that files have to lie in, links followed.
+    folders: Vec<PathBuf>,
+    limits: Limits,
+}
+
 /// One file that was read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InputFile {
@@ -146,12 +162,13 @@ pub fn open(config_path: &Path, options: &OpenOptions) -> Result<LoadedScene> {
 /// Reads everything that a config without a file of its own refers to; it is called `name` in messages.
 ///
 /// Mesh files are looked for in `places`, in order. No file is read that does not lie in one of them, whatever the
-/// config, the meshes or their materials say: for scenes that come from strangers.
+/// config, the meshes or their materials say, and nothing grows beyond `limits`: for scenes that come from strangers.
 ///
 /// # Errors
-/// As [`open`], and kind `Input` for a file outside.
-pub fn open_within(config: SceneConfig, name: &str, places: &[PathBuf]) -> Result<LoadedScene> {
-    let within = places.iter().filter_map(|place| place.canonicalize().ok()).collect();
+/// As [`open`], and kind `Input` for a file outside, and beyond the limits.
+pub fn open_within(config: SceneConfig, name: &str, places: &[PathBuf], limits: Limits) -> Result<LoadedScene> {
+    let folders = places.iter().filter_map(|place| place.canonicalize().ok()).collect();
+    let within = Within { folders, limits };
     let own = InputFile { name: name.to_owned(), sha256: sha256(config.to_json().as_bytes()) };
     assemble(config, Inputs { files: vec![own], within: Some(within) }, places, name)
 }
@@ -172,6 +189,7 @@ fn assemble(config: SceneConfig, inputs: Inputs, places: &[PathBuf], called: &st
         let key = format!("{called}: scene.mesh_files[{index}]");
         let path = find_mesh(name, places, &key)?;
         builder.add_file(index as u32, name, &path)?;
+        builder.check_triangles(name)?;
     }
     let Builder { mesh, inputs, painted, said, known, declared, .. } = builder;
     let (inputs, file_warnings) = (inputs.files, said);
@@ -193,8 +211,8 @@ pub fn file_name(path: &Path) -> String {
 #[derive(Default)]
 struct Inputs {
     files: Vec<InputFile>,
-    /// The folders that files have to lie in; `None` where they may be anywhere.
-    within: Option<Vec<PathBuf>>,
+    /// Absent where files may be anywhere and of any size.
+    within: Option<Within>,
 }
 
 impl Inputs {
@@ -203,7 +221,7 @@ impl Inputs {
         if let Some(within) = &self.within {
             // Links are followed before the question is asked.
             let real = path.canonicalize().ok().filter(|real| real.is_file());
-            if !real.is_some_and(|real| within.iter().any(|folder| real.starts_with(folder))) {
+            if !real.is_some_and(|real| within.folders.iter().any(|folder| real.starts_with(folder))) {
                 let what = format!("expected {expected} in a folder of this scene, found none there: {name:?}");
                 return Err(Error::input(&place, what));
             }
@@ -295,6 +313,28 @@ impl Builder<'_> {
         self.add_models(&models, &checked.materials, file, path)
     }
 
+    /// Whether there are no more triangles than there may be.
+    fn check_triangles(&self, name: &str) -> Result<()> {
+        let (most, found) = (self.inputs.within.as_ref().map(|within| within.limits.triangles), self.mesh.len());
+        match most {
+            Some(most) if found > most => {
+                Err(Error::input(name, format!("expected at most {most} triangles in all here, found {found}")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether there are no more texels than there may be.
+    fn check_texels(&self, place: &str) -> Result<()> {
+        let found: u64 = self.mesh.textures.iter().map(|t| u64::from(t.width) * u64::from(t.height)).sum();
+        match self.inputs.within.as_ref().map(|within| within.limits.texels) {
+            Some(most) if found > most => {
+                Err(Error::input(place, format!("expected at most {most} texels in all here, found {found}")))
+            }
+            _ => Ok(()),
+        }
+    }
+
     fn add_models(&mut self, models: &[tobj::Model], declared: &[MtlMaterial], file: u32, path: &Path) -> Result<()> {
         let name = &self.config.mesh_files[file as usize];
         let mut index_of: HashMap<Option<usize>, u32> = HashMap::new();
@@ -343,6 +383,7 @@ impl Builder<'_> {
         })?;
         let index = self.mesh.textures.len() as u32;
         self.mesh.textures.push(texture);
+        self.check_texels(place)?;
         self.textures.insert(path.to_owned(), index);
         Ok(index)
     }

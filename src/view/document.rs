@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::sampling::{Preset, SamplerSet};
 use crate::scene::compile::{Scene, Stage};
 use crate::scene::config::{SceneConfig, Shading};
-use crate::scene::load::{self, LoadedScene};
+use crate::scene::load::{self, Limits, LoadedScene};
 use crate::scene::mesh::Mesh;
 
 /// The samplers of a document that names none: as `render`'s.
@@ -17,6 +17,9 @@ const SAMPLER: &str = "sobol";
 
 /// The seed of a document that names none: as `render`'s.
 const SEED: u64 = 1;
+
+/// Triangles take about 250 bytes with their tree, texels 3 to 12: at most a gigabyte for each tab.
+const LIMITS: Limits = Limits { triangles: 1 << 22, texels: 1 << 26 };
 
 /// A scene file with sampler and seed made explicit.
 #[derive(Debug, Clone, PartialEq)]
@@ -116,7 +119,7 @@ impl Document {
     /// # Errors
     /// Those of [`load::open_within`].
     pub fn open(&self) -> Result<LoadedScene> {
-        load::open_within(self.config.clone(), &self.name, &self.places)
+        load::open_within(self.config.clone(), &self.name, &self.places, LIMITS)
     }
 
     /// Compiles what was loaded, whose triangles move into the scene; materials, and which triangle has which, stay.
@@ -181,7 +184,7 @@ impl Document {
         config.mesh_files = meshes;
         config.unmodelled.clear();
         let name = "dropped.json";
-        let loaded = load::open_within(config.clone(), name, &places)?;
+        let loaded = load::open_within(config.clone(), name, &places, LIMITS)?;
         let (centre, radius) = bounds(&loaded.mesh);
         let half = libm::tan(f64::from(config.camera.fov_degrees).to_radians() / 2.0) as f32;
         let back = Vec3::new(0.5, 0.4, 1.0).normalize();

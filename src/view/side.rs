@@ -117,7 +117,11 @@ impl Side {
 
     fn after(&mut self, pass: Pass, samples: u64, took: Duration) -> Step {
         match pass {
-            Pass::Stopped => Step::Stale,
+            // The picture has no sample again.
+            Pass::Stopped => {
+                self.seconds = 0.0;
+                Step::Stale
+            }
             Pass::Added { rays } => {
                 self.seconds += took.as_secs_f64();
                 Step::Grown(samples, rays, took)

@@ -1,5 +1,7 @@
 //! What a tab is told of its scene, as JSON.
 
+use std::collections::HashSet;
+
 use glam::Vec3;
 use serde_json::{Map, Value, json};
 
@@ -62,6 +64,8 @@ pub fn whole(document: &Document, loaded: &LoadedScene, scene: &Scene, moving: b
             "lights": lights(scene),
             "triangles": scene.mesh.len(),
             "centre": centre.to_array(), "radius": radius,
+            // How far things are, for the speed of the camera.
+            "depth": scene.camera.auto_focus(&scene.accel),
             "notes": notes,
             "neighbours": document.neighbours(),
         });
@@ -79,13 +83,12 @@ fn merge(into: &mut Value, from: Value) {
 /// Materials by name: a patch of the scene file is one for all of a name.
 fn materials(loaded: &LoadedScene) -> Vec<Value> {
     let mut told: Vec<Value> = Vec::new();
-    let mut names: Vec<&str> = Vec::new();
+    let mut names: HashSet<&str> = HashSet::new();
     for (index, material) in loaded.mesh.materials.iter().enumerate() {
         let Some((albedo, strength)) = loaded.unpatched(index) else { continue };
-        if names.contains(&material.name.as_str()) {
+        if !names.insert(&material.name) {
             continue;
         }
-        names.push(&material.name);
         let patch = loaded.config.materials.iter().find(|patch| patch.name == material.name);
         told.push(json!({
             "name": material.name, "emits": material.is_emitter, "textured": material.texture.is_some(),

@@ -197,7 +197,7 @@ impl Studio {
                 self.speed.traced(samples, rays, took);
                 self.show.is_stale = true;
             }
-            // The change that came in between waits in the inbox and begins everything anew.
+            // The change that came in between waits in the inbox; where it is refused, the picture that was stopped begins anew.
             Ok(Step::Stale) => {}
             Err(bad) => {
                 self.broken = Some(bad.to_string());
@@ -251,11 +251,7 @@ impl Studio {
                     Err(_) => return Ok(Step::Stale),
                 },
             };
-            let step = reference.grow(&mut open.scene, &self.speed, &fresh);
-            if step == Ok(Step::Stale) {
-                self.reference = None;
-            }
-            return step;
+            return reference.grow(&mut open.scene, &self.speed, &fresh);
         }
         let unfinished = self.sides.iter_mut().filter(|side| !side.is_finished());
         let behind = unfinished.min_by(|a, b| a.seconds.total_cmp(&b.seconds));

@@ -26,9 +26,10 @@ export class Flight {
   }
 
   /** The document's camera; not while one is on the way, when ours is newer. */
-  take(camera, radius) {
+  take(camera, { name, radius, depth }) {
     if (!this.isMoving) this.camera = structuredClone(camera);
-    if (radius && radius !== this.radius) [this.radius, this.speed] = [radius, radius * 0.35];
+    // In two seconds to what is in the middle of a scene that is new here.
+    if (radius && name !== this.name) [this.name, this.speed] = [name, (depth ?? radius) * 0.5];
   }
 
   get isMoving() {

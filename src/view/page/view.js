@@ -42,7 +42,7 @@ const link = new Link(
       controls.update(state);
       samplers.update(state);
       configs.update(state);
-      flight.take(state.config.camera, state.radius);
+      flight.take(state.config.camera, state);
       $("#speed").textContent = number(flight.speed);
       if (state.notes) $("#notes").replaceChildren(...state.notes.map((text) => make("li", { textContent: text })));
       for (const option of $("#points-decision").options) option.disabled = !state.made.includes(option.value);
