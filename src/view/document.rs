@@ -147,6 +147,13 @@ impl Document {
         self.places == other.places && truth(self) == truth(other)
     }
 
+    /// Whether every sample is the same: at most the exposure differs.
+    pub fn has_the_samples_of(&self, other: &Self) -> bool {
+        let mut config = other.config.clone();
+        config.framebuffer.exposure = self.config.framebuffer.exposure;
+        self.places == other.places && self.name == other.name && self.config == config
+    }
+
     /// Scene files beside the first one, by name.
     pub fn neighbours(&self) -> Vec<String> {
         let Some(entries) = self.folder.as_ref().and_then(|folder| std::fs::read_dir(folder).ok()) else {

@@ -156,6 +156,10 @@ impl Ask {
 
     /// Whether what is under way is stale with it.
     pub fn is_change(&self) -> bool {
+        if let Self::Set { sets, .. } = self {
+            // The exposure changes what is shown of the samples, and none of these.
+            return sets.iter().any(|set| !set.starts_with("framebuffer.exposure="));
+        }
         !matches!(
             self,
             Self::Save { .. }

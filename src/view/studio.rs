@@ -219,52 +219,69 @@ impl Studio {
 
     /// The most urgent piece: a first picture, then all pixels, then more samples of whoever is behind, then the reference.
     fn step(&mut self) -> Traced {
-        let Some(open) = self.open.as_mut() else { return Ok(Step::Stale) };
         let (inbox, seen) = (self.inbox.clone(), self.inbox.changes());
         let fresh = move || inbox.changes() == seen;
-        let (w, h) = open.scene.camera.size();
+        if let Some(step) = self.first_pictures(&fresh) {
+            return step;
+        }
+        self.show.is_urgent = false;
+        if self.is_turn_of_reference() { self.grow_reference(&fresh) } else { self.grow_sides(&fresh) }
+    }
+
+    /// The first sample: of one pixel in each block, of blocks half as large, at last of every pixel; `None` where that is done.
+    fn first_pictures(&mut self, fresh: &(dyn Fn() -> bool + Sync)) -> Option<Traced> {
+        let scene = &self.open.as_ref()?.scene;
+        let (w, h) = scene.camera.size();
         let panels = self.sides.len();
         if let Some(side) = self.sides.iter_mut().find(|side| side.growing.block().is_none()) {
             let block = self.speed.first_block(u64::from(w) * u64::from(h), panels);
-            return side.first(&open.scene, block, &|| true);
+            return Some(side.first(scene, block, &|| true));
         }
-        let coarsest = self.sides.iter_mut().filter(|side| side.growing.block() > Some(1));
-        if let Some(side) = coarsest.max_by_key(|side| side.growing.block()) {
-            let block = side.growing.block().unwrap_or(2) / 2;
-            return side.first(&open.scene, block, &fresh);
+        let unfinished = self.sides.iter_mut().filter(|side| side.growing.block() > Some(1));
+        let side = unfinished.max_by_key(|side| side.growing.block())?;
+        let block = side.growing.block()? / 2;
+        Some(side.first(scene, block, fresh))
+    }
+
+    /// While pictures are made, the reference takes a quarter of the passes of a camera that rests, half where it is looked at.
+    fn is_turn_of_reference(&self) -> bool {
+        if !self.rests() || !self.wants_reference() {
+            return false;
         }
-        self.show.is_urgent = false;
-        let all_finished = self.sides.iter().all(Side::is_finished);
-        // While pictures are made, the reference takes a quarter of the passes of a camera that rests, half where it is looked at.
         let known = self.reference.as_ref().map_or(0, Reference::samples);
         let is_due = match self.wants_truth {
             true => known == 0 || self.passes % 2 == 1,
             false => self.passes % 4 == 3,
         };
-        let turn = all_finished || (is_due && self.sides.iter().all(|s| !s.is_timing()));
-        let rests = self.changed.elapsed() >= REST;
-        if turn && self.refines && rests && !self.reference.as_ref().is_some_and(Reference::is_finished) {
-            let reference = match &mut self.reference {
-                Some(reference) => reference,
-                none => match Reference::new(&open.scene, None) {
-                    Ok(reference) => none.insert(reference),
-                    Err(_) => return Ok(Step::Stale),
-                },
-            };
-            return reference.grow(&mut open.scene, &self.speed, &fresh);
-        }
+        self.sides.iter().all(Side::is_finished) || (is_due && !self.sides.iter().any(Side::is_timing))
+    }
+
+    fn grow_reference(&mut self, fresh: &(dyn Fn() -> bool + Sync)) -> Traced {
+        let Some(open) = self.open.as_mut() else { return Ok(Step::Stale) };
+        let reference = match &mut self.reference {
+            Some(reference) => reference,
+            none => match Reference::new(&open.scene, None) {
+                Ok(reference) => none.insert(reference),
+                Err(_) => return Ok(Step::Stale),
+            },
+        };
+        reference.grow(&mut open.scene, &self.speed, fresh)
+    }
+
+    /// Adds samples to the picture that has taken less time so far.
+    fn grow_sides(&mut self, fresh: &(dyn Fn() -> bool + Sync)) -> Traced {
+        let Some(open) = self.open.as_ref() else { return Ok(Step::Stale) };
         let unfinished = self.sides.iter_mut().filter(|side| !side.is_finished());
-        let behind = unfinished.min_by(|a, b| a.seconds.total_cmp(&b.seconds));
-        match behind {
-            Some(side) => {
-                let step = side.grow(&open.scene, &self.speed, &fresh)?;
-                if side.is_timing() && side.choose_count(&open.scene).is_err() {
-                    return Ok(Step::Stale);
-                }
-                Ok(step)
-            }
-            None => Ok(Step::Stale),
+        let Some(side) = unfinished.min_by(|a, b| a.seconds.total_cmp(&b.seconds)) else { return Ok(Step::Stale) };
+        let step = match side.growing.samples() < side.sampler.samples() {
+            true => side.grow(&open.scene, &self.speed, fresh)?,
+            // Of one sample alone, whose time is known already.
+            false => Step::Stale,
+        };
+        if side.is_timing() && side.choose_count(&open.scene).is_err() {
+            return Ok(Step::Stale);
         }
+        Ok(step)
     }
 
     /// Opens another document in place of the one that is open, which stays on an error.
@@ -274,6 +291,13 @@ impl Studio {
             old.config.mesh_files == document.config.mesh_files && old.places == document.places
         });
         let keeps_truth = self.open.as_ref().is_some_and(|open| open.document.has_the_truth_of(&document));
+        if let Some(open) = self.open.as_mut().filter(|open| same_meshes && open.document.has_the_samples_of(&document))
+        {
+            open.document = document;
+            self.expose();
+            self.tell_state(moving);
+            return Ok(());
+        }
         if same_meshes {
             self.revise(document, moving)?;
         } else {
@@ -315,14 +339,21 @@ impl Studio {
                 None => None,
             };
         }
-        let exposure = open.document.config.framebuffer.exposure;
-        if exposure != self.exposure {
-            (self.exposure, self.table) = (exposure, ScreenTable::new(exposure));
-        }
+        self.expose();
         self.broken = None;
         self.epoch += 1;
         (self.show.is_stale, self.show.is_urgent) = (true, true);
         Ok(())
+    }
+
+    /// Shows what is there as the document exposes it.
+    fn expose(&mut self) {
+        let Some(open) = &self.open else { return };
+        let exposure = open.document.config.framebuffer.exposure;
+        if exposure != self.exposure {
+            (self.exposure, self.table) = (exposure, ScreenTable::new(exposure));
+            self.show.is_stale = true;
+        }
     }
 
     fn note_acknowledged(&mut self, frame: u64) {

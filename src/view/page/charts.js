@@ -90,8 +90,9 @@ export function spectrum(panels, reference) {
       context.lineTo(width - 8, y(mse));
       context.stroke();
     }
-    const key = make("span", { textContent: i === 0 ? "━ " : "╍ " });
-    key.style.color = COLOURS[i];
+    const key = make("span", { className: "key" });
+    key.style.borderTopColor = COLOURS[i];
+    key.style.borderTopStyle = i === 0 ? "solid" : "dashed";
     const share = (v) => (v == null ? "–" : `${(100 * v).toPrecision(3)} %`);
     rows.append(make("tr", {}, make("th", { scope: "row" }, key, `${sampler}, ${samples} spp`), make("td", { textContent: `low-frequency share ${share(s.low_share?.value)}; white noise ${share(s.white_low_share)}` })));
   });
