@@ -385,7 +385,7 @@ fn bad_requests_are_refused_with_their_place_and_the_last_good_picture_stays() {
         (set("sampler=\"haltn\""), "did you mean \"halton\""),
         (set("sampler=\"center\""), "center"),
         (set("seed=-1"), "seed"),
-        (set("scene.mesh_files=[\"../../../../etc/passwd\"]"), "mesh_files[0]"),
+        (set("scene.mesh_files=[\"../../../../etc/passwd\"]"), "in a folder of this scene"),
         (set("scene.mesh_files=[\"/etc/passwd\"]"), "in a folder of this scene"),
         (set("scene.mesh_files=[\"absent.obj\"]"), "absent.obj"),
         (set("camera.pos=[1e30, 0, 0]"), "reach"),
@@ -490,6 +490,31 @@ fn uploads_stay_in_their_folder_and_go_with_the_tab() {
     // Other tests run at the same time: those of this server are gone with it.
     let left = |f: &String| std::env::temp_dir().join(f).join("1").join("6").join("tri.obj").exists();
     assert!(!made.iter().any(left));
+}
+
+#[test]
+fn scenes_of_strangers_stay_within_their_folders_and_bounds() {
+    let loaded = load::open(&config("a01.json"), &OpenOptions::default()).unwrap();
+    let texels: u64 = loaded.mesh.textures.iter().map(|t| u64::from(t.width) * u64::from(t.height)).sum();
+    let (triangles, data) = (loaded.mesh.len(), vec![config("../data")]);
+    let open =
+        |triangles, texels| load::open_within(loaded.config.clone(), "a01", &data, load::Limits { triangles, texels });
+    assert_eq!(open(triangles, texels).unwrap().mesh, loaded.mesh);
+    let what = |error: sampler_lab::error::Error| error.to_string();
+    assert!(what(open(triangles - 1, texels).unwrap_err()).contains(&format!("at most {} triangles", triangles - 1)));
+    assert!(what(open(triangles, texels - 1).unwrap_err()).contains(&format!("at most {} texels", texels - 1)));
+    // A link out of the folder is followed before it is judged.
+    #[cfg(unix)]
+    {
+        let folder = tempfile::tempdir().unwrap();
+        std::os::unix::fs::symlink(config("../data/checkerpots/checkerpots.obj"), folder.path().join("link.obj"))
+            .unwrap();
+        let mut linked = loaded.config.clone();
+        linked.mesh_files = vec!["link.obj".to_owned()];
+        let limits = load::Limits { triangles, texels };
+        let error = load::open_within(linked, "linked", &[folder.path().to_owned()], limits).unwrap_err();
+        assert!(error.to_string().contains("in a folder of this scene"), "{error}");
+    }
 }
 
 #[test]

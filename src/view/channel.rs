@@ -16,6 +16,9 @@ use super::uploads::MAX_UPLOAD_BYTES;
 /// Most requests that wait; changes of one key count once.
 const MAX_WAITING: usize = 64;
 
+/// Most changes of keys that join into one.
+const MAX_JOINED: usize = 256;
+
 /// Most messages that wait to be sent; a tab that does not take them is gone.
 const MAX_UNSENT: usize = 256;
 
@@ -49,8 +52,17 @@ pub struct Inbox {
 #[derive(Default)]
 struct Waiting {
     asks: VecDeque<Ask>,
-    acknowledged: u64,
+    shown: Shown,
     closed: bool,
+}
+
+/// The last frame that was shown, and when that was heard.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Shown {
+    /// Its number.
+    pub frame: u64,
+    /// Absent before the first.
+    pub at: Option<Instant>,
 }
 
 impl Inbox {
@@ -62,8 +74,11 @@ impl Inbox {
         }
         let is_full = waiting.asks.len() >= MAX_WAITING;
         match (waiting.asks.back_mut(), ask) {
-            (_, Ask::Shown { frame }) => waiting.acknowledged = waiting.acknowledged.max(frame),
-            (Some(Ask::Set { sets: old, moving: was }), Ask::Set { sets, moving }) => {
+            (_, Ask::Shown { frame }) if frame > waiting.shown.frame => {
+                waiting.shown = Shown { frame, at: Some(Instant::now()) };
+            }
+            (_, Ask::Shown { .. }) => {}
+            (Some(Ask::Set { sets: old, moving: was }), Ask::Set { sets, moving }) if old.len() < MAX_JOINED => {
                 join(old, sets);
                 *was = moving;
             }
@@ -92,16 +107,16 @@ impl Inbox {
         self.changes.load(Ordering::Relaxed)
     }
 
-    /// Everything that waits, and the last picture that was acknowledged. Waits up to `patience` for anything to come.
-    pub fn take(&self, patience: Duration) -> (Vec<Ask>, u64) {
+    /// Everything that waits, the last frame that was shown, and how many changes these were. Waits up to `patience` for anything to come.
+    pub fn take(&self, patience: Duration) -> (Vec<Ask>, Shown, u64) {
         let mut waiting = lock(&self.waiting);
         if patience > Duration::ZERO && waiting.asks.is_empty() && !waiting.closed {
-            let acknowledged = waiting.acknowledged;
-            let idle = |w: &mut Waiting| w.asks.is_empty() && !w.closed && w.acknowledged == acknowledged;
+            let shown = waiting.shown;
+            let idle = |w: &mut Waiting| w.asks.is_empty() && !w.closed && w.shown == shown;
             let waited = self.arrived.wait_timeout_while(waiting, patience, idle);
             waiting = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
-        (waiting.asks.drain(..).collect(), waiting.acknowledged)
+        (waiting.asks.drain(..).collect(), waiting.shown, self.changes())
     }
 }
 

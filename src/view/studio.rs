@@ -7,10 +7,10 @@ use serde_json::{Value, json};
 
 use super::House;
 use super::analyst::{self, Analyst, SharedFigures};
-use super::channel::{Inbox, Outbox};
+use super::channel::{Inbox, Outbox, Shown};
 use super::document::Document;
 use super::message::View;
-use super::picture::{self, Shown};
+use super::picture;
 use super::reference::Reference;
 use super::side::{Budget, Side, Step, Traced};
 use super::speed::Speed;
@@ -71,6 +71,8 @@ pub struct Studio {
     speed: Speed,
     /// Counts pieces of work, whose turn it is.
     passes: u64,
+    /// How many changes are taken into account.
+    seen: u64,
     /// Counts pictures that began: what was measured of another is of no use.
     epoch: u64,
     changed: Instant,
@@ -119,6 +121,7 @@ impl Studio {
             exposure: crate::film::DEFAULT_EXPOSURE,
             speed: Speed::default(),
             passes: 0,
+            seen: 0,
             epoch: 0,
             changed: now,
             show,
@@ -140,11 +143,12 @@ impl Studio {
         }
         loop {
             let patience = if self.has_work() { Duration::ZERO } else { self.patience() };
-            let (asks, acknowledged) = self.inbox.take(patience);
+            let (asks, shown, seen) = self.inbox.take(patience);
+            self.seen = seen;
             if self.inbox.is_closed() {
                 return;
             }
-            self.note_acknowledged(acknowledged);
+            self.note_shown(shown);
             for ask in asks {
                 if let Err(e) = self.answer(ask) {
                     self.complain(&e);
@@ -219,7 +223,7 @@ impl Studio {
 
     /// The most urgent piece: a first picture, then all pixels, then more samples of whoever is behind, then the reference.
     fn step(&mut self) -> Traced {
-        let (inbox, seen) = (self.inbox.clone(), self.inbox.changes());
+        let (inbox, seen) = (self.inbox.clone(), self.seen);
         let fresh = move || inbox.changes() == seen;
         if let Some(step) = self.first_pictures(&fresh) {
             return step;
@@ -356,11 +360,11 @@ impl Studio {
         }
     }
 
-    fn note_acknowledged(&mut self, frame: u64) {
-        if frame > self.show.acknowledged {
-            self.show.acknowledged = frame;
-            if frame == self.show.sent {
-                self.speed.sent(self.show.bytes, self.show.at.elapsed());
+    fn note_shown(&mut self, shown: Shown) {
+        if shown.frame > self.show.acknowledged {
+            self.show.acknowledged = shown.frame;
+            if let (true, Some(at)) = (shown.frame == self.show.sent, shown.at) {
+                self.speed.sent(self.show.bytes, at.saturating_duration_since(self.show.at));
             }
         }
     }
@@ -376,7 +380,7 @@ impl Studio {
         // One reference for all panels.
         let wants_reference = matches!(self.view, View::Reference | View::Error);
         let reference = self.reference.as_ref().filter(|_| wants_reference).and_then(Reference::image);
-        let shown: Vec<Shown> = self
+        let shown: Vec<picture::Shown> = self
             .sides
             .iter()
             .map(|side| match (self.view, &reference, scale) {
@@ -390,14 +394,15 @@ impl Studio {
             })
             .collect();
         self.show.sent += 1;
+        self.show.at = Instant::now();
         let panels: Vec<Value> = self.sides.iter().zip(&shown).map(|(side, s)| self.frame_header(side, s)).collect();
         let header = json!({"is": "frame", "frame": self.show.sent, "epoch": self.epoch, "panels": panels});
-        let bytes: Vec<u8> = shown.into_iter().flat_map(|s| s.bytes).collect();
+        let bytes = shown.into_iter().map(|s| s.bytes).collect::<Vec<_>>().concat();
         self.outbox.send_bytes(&header, &bytes);
-        (self.show.at, self.show.bytes, self.show.is_stale) = (Instant::now(), bytes.len(), false);
+        (self.show.bytes, self.show.is_stale) = (bytes.len(), false);
     }
 
-    fn frame_header(&self, side: &Side, shown: &Shown) -> Value {
+    fn frame_header(&self, side: &Side, shown: &picture::Shown) -> Value {
         let (w, h) = side.growing.size();
         json!({
             "width": shown.width, "height": shown.height, "full": [w, h], "view": shown.view, "scale": shown.scale,

@@ -5,6 +5,7 @@
 #![cfg(unix)]
 
 mod chromium;
+mod view;
 
 use chromium::Browser;
 

@@ -42,7 +42,7 @@ export class Controls {
 
   /** Shows a state of the document. */
   update(state) {
-    this.state = state;
+    this.state = { ...this.state, ...state };
     for (const update of this.updates) update(state);
     if (state.materials) {
       this.materials(document.querySelector("#materials-panel"));

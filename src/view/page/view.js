@@ -10,7 +10,7 @@ import { Screen, many, number } from "./screen.js";
 
 const $ = (selector) => document.querySelector(selector);
 const screens = [new Screen("a"), new Screen("b")];
-let samplers, configs, picked, flipped = 0, panels = 1, latest, spectral = 0;
+let samplers, configs, picked, flipped = 0, panels = 1, spectral = 0;
 
 function say(text, good = false) {
   $("#message").hidden = !text;
@@ -35,7 +35,6 @@ const link = new Link(
       document.body.dataset.connected = "yes";
     },
     state(state) {
-      latest = { ...latest, ...state };
       if (!state.moving) say("");
       $("#scene-name").textContent = state.name;
       document.title = `${state.name} · sampler-lab view`;

@@ -264,7 +264,9 @@ impl Studio {
             let what = "expected a config (.json), a mesh (.obj, with its .mtl and textures) or a point set (.csv)";
             return Err(Error::input("drop", format!("{what}, found {}", names.join(" "))));
         };
-        let found = read_csv_file(&folder.join(name)).map_err(|e| Error { place: name.clone(), ..e })?;
+        let path = folder.join(name);
+        let called = |e: Error| Error { place: e.place.replace(&path.display().to_string(), name), ..e };
+        let found = read_csv_file(&path).map_err(called)?;
         if found.n() > MAX_POINTS {
             let what =
                 format!("expected at most {MAX_POINTS} points, found {} (remedy: `sampler-lab measure`)", found.n());
