@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 
 pub use pfm::write_pfm;
 pub use picture::{MAX_PIXELS, PICTURE_PIXEL_BYTES, Picture, read_picture};
-pub use screen::{DEFAULT_EXPOSURE, screen_light, srgb_decode, srgb_encode, to_screen, tone_map};
+pub use screen::{DEFAULT_EXPOSURE, ScreenTable, screen_light, srgb_decode, srgb_encode, to_screen, tone_map};
 
 /// Linear radiance, `f32` RGB, top row first: `pixels[y * width + x]`.
 #[derive(Debug, Clone, PartialEq)]
@@ -114,6 +114,24 @@ pub fn write_exr_plain(path: &Path, image: &Image, provenance: &[(String, String
 }
 
 fn write_exr_as(path: &Path, image: &Image, provenance: &[(String, String)], compression: Compression) -> Result<()> {
+    let bytes = exr_bytes_as(image, provenance, compression)
+        .map_err(|e| Error::write(path, format!("cannot encode EXR: {e}")))?;
+    write_renamed(path, &bytes, false)
+}
+
+/// The bytes of the file that [`write_exr`] writes.
+///
+/// # Errors
+/// What the encoder says.
+pub fn exr_bytes(image: &Image, provenance: &[(String, String)]) -> std::result::Result<Vec<u8>, String> {
+    exr_bytes_as(image, provenance, Compression::ZIP16)
+}
+
+fn exr_bytes_as(
+    image: &Image,
+    provenance: &[(String, String)],
+    compression: Compression,
+) -> std::result::Result<Vec<u8>, String> {
     let size = Vec2(image.width as usize, image.height as usize);
     let channels = SpecificChannels::rgb(|at: Vec2<usize>| {
         let [r, g, b] = image.pixels[at.y() * image.width as usize + at.x()];
@@ -127,10 +145,8 @@ fn write_exr_as(path: &Path, image: &Image, provenance: &[(String, String)], com
     }
     let encoding = Encoding { compression, ..Encoding::default() };
     let file = exr::prelude::Image::from_layer(Layer::new(size, layer, encoding, channels));
-    let bytes = encode_exr(&file).map_err(|e| Error::write(path, format!("cannot encode EXR: {e}")))?;
-    let bytes = with_sorted_attributes(bytes)
-        .ok_or_else(|| Error::write(path, "cannot encode EXR: its header does not read back"))?;
-    write_renamed(path, &bytes, false)
+    let bytes = encode_exr(&file).map_err(|e| e.to_string())?;
+    with_sorted_attributes(bytes).ok_or_else(|| "its header does not read back".to_owned())
 }
 
 /// The file's bytes. As the package's own writer makes them, with the blocks compressed side by side and written in their order.
@@ -221,6 +237,16 @@ pub fn read_exr(path: &Path) -> Result<(Image, Vec<(String, String)>)> {
 /// # Errors
 /// Kind `Write` where the file cannot be written.
 pub fn write_png_rgb8(path: &Path, width: u32, height: u32, bytes: &[u8]) -> Result<()> {
+    let png =
+        png_rgb8_bytes(width, height, bytes).map_err(|e| Error::write(path, format!("cannot encode PNG: {e}")))?;
+    write_whole(path, &png)
+}
+
+/// The bytes of the file that [`write_png_rgb8`] writes.
+///
+/// # Errors
+/// What the encoder says.
+pub fn png_rgb8_bytes(width: u32, height: u32, bytes: &[u8]) -> std::result::Result<Vec<u8>, String> {
     use image::ImageEncoder;
     use image::codecs::png::{CompressionType, FilterType, PngEncoder};
     // Pictures compress better with row filters, charts without: the smaller is kept.
@@ -228,13 +254,12 @@ pub fn write_png_rgb8(path: &Path, width: u32, height: u32, bytes: &[u8]) -> Res
         let mut png = Vec::new();
         PngEncoder::new_with_quality(&mut png, CompressionType::Best, filter)
             .write_image(bytes, width, height, image::ExtendedColorType::Rgb8)
-            .map_err(|e| Error::write(path, format!("cannot encode PNG: {e}")))?;
-        Ok(png)
+            .map_err(|e| e.to_string())?;
+        Ok::<_, String>(png)
     };
     let (filtered, plain) = rayon::join(|| encoded(FilterType::Adaptive), || encoded(FilterType::NoFilter));
     let (filtered, plain) = (filtered?, plain?);
-    let png = if plain.len() < filtered.len() { plain } else { filtered };
-    write_whole(path, &png)
+    Ok(if plain.len() < filtered.len() { plain } else { filtered })
 }
 
 /// Writes a tone-mapped PNG.

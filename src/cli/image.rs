@@ -12,7 +12,7 @@ use sampler_lab::film::{check_writable, write_exr, write_png};
 use sampler_lab::render::render_observed;
 use sampler_lab::sampling::{Decision, MAX_SAMPLES, PointSource, Sampler};
 use sampler_lab::scene::compile::{Scene, Stage};
-use sampler_lab::scene::config::Estimator;
+use sampler_lab::scene::config::{Estimator, SceneConfig};
 use serde_json::json;
 
 use super::{DecisionArgs, SceneArgs, WorkArgs, print_json, say};
@@ -25,9 +25,9 @@ pub struct Render {
     /// Where the image goes: linear .exr or tone-mapped .png [default: the scene's name with .png]
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Sampler for every decision; a bare name means its :best
-    #[arg(long, default_value = "sobol")]
-    sampler: String,
+    /// Sampler for every decision; a bare name means its :best [default: the scene's, else sobol]
+    #[arg(long)]
+    sampler: Option<String>,
     #[command(flatten)]
     decisions: DecisionArgs,
     /// Samples per pixel [default: the scene's sppx]
@@ -45,9 +45,9 @@ pub struct Render {
     /// Instructions that trace the rays: scalar, avx2, avx512; all give the same image [default: the widest here]
     #[arg(long, value_name = "NAME")]
     kernel: Option<String>,
-    /// Seed of the randomisation
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
+    /// Seed of the randomisation [default: the scene's, else 1]
+    #[arg(long)]
+    seed: Option<u64>,
     /// One JSON document on stdout
     #[arg(long)]
     json: bool,
@@ -60,7 +60,11 @@ pub struct Render {
 impl Render {
     /// Renders and writes the image.
     pub fn run(self) -> Result<()> {
-        let set = self.decisions.set(&self.sampler)?;
+        let named = match &self.sampler {
+            Some(sampler) => sampler.clone(),
+            None => SceneConfig::read(&self.scene, &self.files.set)?.sampler.unwrap_or_else(|| "sobol".to_owned()),
+        };
+        let set = self.decisions.set(&named)?;
         let stage = Stage::ALL.into_iter().find(|s| s.name() == self.stage).ok_or_else(|| {
             Error::input("--stage", format!("expected start, aa, dof or final, found \"{}\"", self.stage))
         })?;
@@ -107,7 +111,8 @@ impl Render {
         self.work.warn(&self.decisions.notes(&self.scene, &scene.layout));
 
         let asked = self.spp.unwrap_or(framebuffer.sppx);
-        let sampler = Sampler::new(set, &scene.layout, asked, self.seed)?;
+        let seed = self.seed.or(loaded.config.seed).unwrap_or(1);
+        let sampler = Sampler::new(set, &scene.layout, asked, seed)?;
         let samples = size.pixels() * u64::from(sampler.samples());
         if !self.work.quiet {
             say(format_args!(
@@ -115,7 +120,7 @@ impl Render {
                 self.scene.display(),
                 sampler.samples(),
                 match set.single() {
-                    Some(spec) => format!("{} = {}", self.sampler, spec.expansion()),
+                    Some(spec) => format!("{named} = {}", spec.expansion()),
                     None => set.expansion(),
                 }
             ));
@@ -139,7 +144,7 @@ impl Render {
                     text("scene", &self.scene.display()),
                     text("sampler", &set),
                     text("spp", &sampler.samples()),
-                    text("seed", &self.seed),
+                    text("seed", &seed),
                     text("estimator", &estimator),
                     text("stage", &stage.name()),
                 ];
@@ -169,7 +174,7 @@ impl Render {
                 "stage": stage.name(),
                 "spp": {"asked": asked, "taken": sampler.samples()},
                 "size": size.to_string(),
-                "seed": self.seed,
+                "seed": seed,
                 "kernel": scene.accel.kernel().name(),
                 "focal_depth": scene.focal_depth(),
                 "render_seconds": render_seconds,

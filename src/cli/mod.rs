@@ -8,6 +8,7 @@ mod folders;
 mod image;
 mod sets;
 mod signals;
+mod view;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -53,6 +54,8 @@ enum Command {
     Check(check::Check),
     /// Measure speed: samplers, rays, renders, builds, loading, metrics, growth, memory
     Bench(bench::Bench),
+    /// Live view and controls in a browser, served on 127.0.0.1
+    View(view::View),
     /// Show or check a scene file
     Config(Config),
     /// Say what a sampler does, and which numbers its decisions read for a scene
@@ -74,6 +77,7 @@ impl Cli {
             Command::Compare(args) => args.run(),
             Command::Check(args) => args.run(),
             Command::Bench(args) => args.run(),
+            Command::View(args) => args.run(),
             Command::Config(args) => args.run(),
             Command::Explain(args) => args.run(),
         }
@@ -244,6 +248,10 @@ impl Config {
                 let loaded = args.scene.open(&args.file)?;
                 for warning in &loaded.warnings {
                     say(format_args!("note: {warning}"));
+                }
+                if let Some(sampler) = &loaded.config.sampler {
+                    SamplerSet::parse(sampler, Preset::Best)
+                        .map_err(|e| Error::input(format!("{}: sampler", args.file.display()), e))?;
                 }
                 let framebuffer = loaded.config.framebuffer;
                 let triangles = loaded.mesh.len();

@@ -54,6 +54,61 @@ pub fn to_screen(image: &Image, exposure: f32) -> Vec<u8> {
     bytes
 }
 
+/// The code values of one exposure, looked up: what a live picture can afford, with the codes of [`to_screen`].
+///
+/// The curve rises with radiance, so a code begins at a least radiance, found once by bisection over the floats above 0; a table
+/// over the upper bits of a float says near which code to start.
+pub struct ScreenTable {
+    /// The bits of the least radiance of each code from 1 on; beyond every float where a code is never reached.
+    starts: [u32; 256],
+    /// For the upper 16 bits of a float of 0 or above: the code of its least value with those bits.
+    codes: Vec<u8>,
+}
+
+impl ScreenTable {
+    /// The table of an exposure of 0 or above.
+    pub fn new(exposure: f32) -> Self {
+        const INFINITE: u32 = f32::INFINITY.to_bits();
+        let code = |bits: u32| code_value(f32::from_bits(bits), exposure);
+        let mut starts = [u32::MAX; 256];
+        let mut low = 0;
+        for wanted in 0..=255u8 {
+            let mut high = INFINITE;
+            if code(high) < wanted || code(f32::MAX.to_bits()) < wanted {
+                continue;
+            }
+            while low < high {
+                let middle = low + (high - low) / 2;
+                if code(middle) >= wanted { high = middle } else { low = middle + 1 }
+            }
+            starts[usize::from(wanted)] = low;
+        }
+        let mut at = 0u8;
+        let codes = (0..=INFINITE >> 16).map(|upper| {
+            while at < 255 && starts[usize::from(at) + 1] <= upper << 16 {
+                at += 1;
+            }
+            at
+        });
+        Self { codes: codes.collect(), starts }
+    }
+
+    /// The code value of 8 bits of a radiance; below 0 it is black.
+    #[inline]
+    pub fn code(&self, radiance: f32) -> u8 {
+        // Written so that what is no number is black.
+        if !(radiance > 0.0) {
+            return self.codes[0];
+        }
+        let bits = radiance.to_bits();
+        let mut code = self.codes[(bits >> 16) as usize];
+        while code < 255 && self.starts[usize::from(code) + 1] <= bits {
+            code += 1;
+        }
+        code
+    }
+}
+
 /// The light that a screen emits for a pixel of the PNG at this exposure: linear sRGB in [0, 1], decoded from its 8 bits.
 pub fn screen_light(radiance: [f32; 3], exposure: f32) -> [f64; 3] {
     static LIGHT: LazyLock<[f64; 256]> = LazyLock::new(|| {
@@ -86,6 +141,25 @@ mod tests {
         }
         for bright in [11.3, 1e10, 1e20, f32::MAX, f32::INFINITY] {
             assert_eq!(code_value(bright, 3.0), 255, "{bright}");
+        }
+    }
+
+    #[test]
+    fn the_table_has_the_codes_of_the_curve() {
+        for exposure in [0.0, 1e-6, 0.3, 1.0, 3.0, 17.5, 1e6, 1e30] {
+            let table = ScreenTable::new(exposure);
+            let mut bits = 0u32;
+            // Every 9973rd float up to infinity, which visits each of the table's 32641 cells six times.
+            while bits <= f32::INFINITY.to_bits() {
+                let radiance = f32::from_bits(bits);
+                if !(exposure * radiance).is_nan() {
+                    assert_eq!(table.code(radiance), code_value(radiance, exposure), "{radiance} at {exposure}");
+                }
+                bits += 9973;
+            }
+            for odd in [-1.0, -0.0, f32::NAN, f32::MIN] {
+                assert_eq!(table.code(odd), code_value(0.0, exposure), "{odd}");
+            }
         }
     }
 

@@ -10,7 +10,7 @@ use super::camera::{Aperture, Camera, PixelSample};
 use super::config::{Estimator, SceneConfig, Shading};
 use super::geometry::{self, Face};
 use super::light::LightSet;
-use super::mesh::{Mesh, Texture};
+use super::mesh::{Material, Mesh, Texture};
 
 /// The four stages of the sheet's Figure 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,6 +60,25 @@ pub struct Scene {
     /// Things a user should hear of, among them what could not be focused on.
     pub warnings: Vec<String>,
     focus: Focus,
+    /// What the tree's boxes are padded for.
+    tree_reach: f32,
+}
+
+/// What of a scene does not depend on camera and lights.
+struct Body {
+    mesh: Mesh,
+    faces: Vec<Face>,
+    accel: Accel,
+    tree_reach: f32,
+}
+
+/// Which tree a changed scene has to have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tree {
+    /// The one that [`Scene::new`] builds, for the same bits.
+    Exact,
+    /// One that finds every hit: for a camera on its way.
+    Roomy,
 }
 
 /// How the plane of focus came about.
@@ -93,6 +112,74 @@ impl Scene {
         let accel = Accel::new(&geometry::triangles(&mesh), reach);
         // After the tree, as what it took while it was built is free again.
         let faces = geometry::faces(&mesh);
+        let body = Body { faces, accel, tree_reach: reach, mesh };
+        Self::assemble(config, body, size, stage).map_err(|(error, _)| error)
+    }
+
+    /// The same meshes under another config, with `materials` in place of theirs: what [`Scene::new`] gives, without what did
+    /// not change being made again. On an error the scene stays as it is.
+    ///
+    /// Boxes are padded by how far rays reach, so a camera that leaves the scene's surroundings takes a new tree. With
+    /// [`Tree::Roomy`] a tree that is padded for more is kept, and a new one is padded for twice the reach: every ray then meets
+    /// what it should, but the last bits of a distance may not be those of [`Scene::new`]. [`Tree::Exact`] makes up for that.
+    /// Returns whether the tree was built.
+    ///
+    /// # Errors
+    /// As [`Scene::new`].
+    pub fn revise(
+        &mut self,
+        config: &SceneConfig,
+        materials: &[Material],
+        size: (u32, u32),
+        stage: Stage,
+        tree: Tree,
+    ) -> Result<bool> {
+        let reach = reach(&self.mesh, config.camera.pos);
+        check_reach(reach)?;
+        let keeps = match tree {
+            Tree::Exact => reach == self.tree_reach,
+            Tree::Roomy => reach <= self.tree_reach,
+        };
+        let mut body = self.take_body();
+        let old = std::mem::replace(&mut body.mesh.materials, materials.to_vec());
+        if !keeps {
+            body.tree_reach = if tree == Tree::Roomy { (2.0 * reach).min(MAX_REACH) } else { reach };
+            body.accel = Accel::new(&geometry::triangles(&body.mesh), body.tree_reach);
+        }
+        match Self::assemble(config, body, size, stage) {
+            Ok(scene) => *self = scene,
+            Err((error, mut body)) => {
+                body.mesh.materials = old;
+                let Body { mesh, faces, accel, tree_reach } = *body;
+                (self.mesh, self.faces, self.accel, self.tree_reach) = (mesh, faces, accel, tree_reach);
+                return Err(error);
+            }
+        }
+        Ok(!keeps)
+    }
+
+    /// Whether the tree is padded for exactly what rays reach, as that of [`Scene::new`].
+    pub fn has_exact_tree(&self) -> bool {
+        self.tree_reach == self.reach()
+    }
+
+    fn take_body(&mut self) -> Body {
+        Body {
+            mesh: std::mem::take(&mut self.mesh),
+            faces: std::mem::take(&mut self.faces),
+            accel: std::mem::replace(&mut self.accel, Accel::new(&[], 0.0)),
+            tree_reach: self.tree_reach,
+        }
+    }
+
+    /// Puts camera and lights to triangles and tree; an error gives these back.
+    fn assemble(
+        config: &SceneConfig,
+        body: Body,
+        size: (u32, u32),
+        stage: Stage,
+    ) -> std::result::Result<Self, (Error, Box<Body>)> {
+        let Body { mesh, faces, accel, tree_reach } = body;
         let mut layout = SampleLayout::default();
         let pixel = match stage {
             Stage::Start => PixelSample::Center,
@@ -116,11 +203,13 @@ impl Scene {
         }
         let camera = Camera::new(&config.camera, size, pixel, aperture);
         let focus = Focus { auto: config.auto_focus, configured: config.camera.focal_depth };
-        let mut scene =
-            Self { mesh, faces, accel, camera, lights, estimator: config.estimator, layout, warnings, focus };
+        let estimator = config.estimator;
+        let mut scene = Self { mesh, faces, accel, camera, lights, estimator, layout, warnings, focus, tree_reach };
         scene.refocus();
-        scene.check_lens()?;
-        Ok(scene)
+        match scene.check_lens() {
+            Ok(()) => Ok(scene),
+            Err(error) => Err((error, Box::new(scene.take_body()))),
+        }
     }
 
     /// Whether single precision can hold the lens's rays: else their directions would overflow, meet nothing, and the picture be black.

@@ -36,6 +36,10 @@ pub struct SceneConfig {
     pub shading: Shading,
     /// How several lights are weighted.
     pub estimator: Estimator,
+    /// The sampler of each decision, as whoever renders reads it; absent where the file leaves it open.
+    pub sampler: Option<String>,
+    /// The seed of the randomisation; absent where the file leaves it open.
+    pub seed: Option<u64>,
     /// Known keys that are kept and exported but not modelled, each with the object it stands in (`""` is the top).
     pub unmodelled: Vec<(Section, String, Value)>,
 }
@@ -124,7 +128,17 @@ impl Section {
     /// The keys that mean something here.
     fn keys(self) -> &'static [&'static str] {
         match self {
-            Self::Top => &["camera", "auto_focus", "framebuffer", "scene", "algorithm", "shading", "estimator"],
+            Self::Top => &[
+                "camera",
+                "auto_focus",
+                "framebuffer",
+                "scene",
+                "algorithm",
+                "shading",
+                "estimator",
+                "sampler",
+                "seed",
+            ],
             Self::Camera => &["pos", "dir", "up", "fov", "lens_radius", "focal_depth"],
             Self::Framebuffer => &["res_w", "res_h", "sppx", "exposure"],
             Self::Scene => &["mesh_files", "materials", "sky", "volume"],
@@ -214,6 +228,8 @@ impl Default for SceneConfig {
             materials: Vec::new(),
             shading: Shading::Direct,
             estimator: Estimator::Unbiased,
+            sampler: None,
+            seed: None,
             unmodelled: Vec::new(),
         }
     }
@@ -295,6 +311,8 @@ impl SceneConfig {
         top.opt("algorithm", read_algorithm)?;
         config.shading = top.or("shading", config.shading, |i| i.choice(&SHADINGS))?;
         config.estimator = top.or("estimator", config.estimator, |i| i.choice(&ESTIMATORS))?;
+        config.sampler = top.opt("sampler", |i| i.text("a sampler, or one for each decision").map(str::to_owned))?;
+        config.seed = top.opt("seed", |i| i.integer(0..=u64::MAX))?;
         keep_rest(&mut top, Section::Top, kept)?;
         Ok(config)
     }
@@ -359,7 +377,13 @@ impl SceneConfig {
             ("shading", Value::text(self.shading.name())),
             ("estimator", Value::text(self.estimator.name())),
         ]);
-        Value::Object(top.chain(kept(Section::Top)).collect())
+        // What renders the scene has its own defaults for these.
+        let open = [
+            self.sampler.as_ref().map(|sampler| ("sampler", Value::text(sampler))),
+            self.seed.map(|seed| ("seed", Value::integer(seed))),
+        ];
+        let open = object(open.into_iter().flatten());
+        Value::Object(top.chain(open).chain(kept(Section::Top)).collect())
     }
 
     /// [`SceneConfig::to_value`] as indented JSON: what `config show` prints.
@@ -695,16 +719,21 @@ mod tests {
             .prop_flat_map(|n| (0..n).map(|i| any_patch(format!("teapot \"{i}\"\\.001"))).collect::<Vec<_>>());
         let kept = prop::option::of(any::<i64>())
             .prop_map(|n| n.map(|n| (Section::Camera, "rr_depth".to_owned(), Value::integer(n))).into_iter().collect());
-        (camera, any::<bool>(), framebuffer, files, patches, shading, estimator, kept).prop_map(
-            |(camera, auto_focus, framebuffer, mesh_files, materials, shading, estimator, unmodelled)| SceneConfig {
-                camera,
-                auto_focus,
-                framebuffer,
-                mesh_files,
-                materials,
-                shading,
-                estimator,
-                unmodelled,
+        let open = (prop::option::of(".{0,9}"), prop::option::of(any::<u64>()));
+        (camera, any::<bool>(), framebuffer, files, patches, shading, (estimator, open), kept).prop_map(
+            |(camera, auto_focus, framebuffer, mesh_files, materials, shading, (estimator, open), unmodelled)| {
+                SceneConfig {
+                    camera,
+                    auto_focus,
+                    framebuffer,
+                    mesh_files,
+                    materials,
+                    shading,
+                    estimator,
+                    sampler: open.0,
+                    seed: open.1,
+                    unmodelled,
+                }
             },
         )
     }

@@ -39,6 +39,22 @@ pub struct OpenOptions {
     pub sets: Vec<String>,
 }
 
+/// How large a scene of [`open_within`] may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Triangles of all its meshes.
+    pub triangles: usize,
+    /// Texels of all its textures.
+    pub texels: u64,
+}
+
+/// What a scene may read, and how much.
+struct Within {
+    /// The folders that files have to lie in, links followed.
+    folders: Vec<PathBuf>,
+    limits: Limits,
+}
+
 /// One file that was read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InputFile {
@@ -59,16 +75,24 @@ pub struct LoadedScene {
     pub inputs: Vec<InputFile>,
     /// What a person should know about the picture, one line each; emitters and simplifications among it.
     pub warnings: Vec<String>,
+    /// The materials as their MTL files give them, one for each of the mesh; `None` for the default grey.
+    declared: Vec<Option<MtlMaterial>>,
+    /// Names of all materials that the MTL files declare, used or not.
+    known: Vec<String>,
+    /// What the mesh files gave to say, whatever the config.
+    file_warnings: Vec<String>,
 }
 
 impl LoadedScene {
     /// SHA-256, in hex, of everything that decides the picture but for what an experiment sets itself (size, samples,
-    /// exposure, estimator): the full state, defaults and `--set` applied, and the other files' names and bytes. The
+    /// exposure, estimator, sampler, seed): the full state, defaults and `--set` applied, and the other files' names and bytes. The
     /// scene file's own layout does not count.
     pub fn content_sha256(&self) -> String {
         let state = SceneConfig {
             framebuffer: FramebufferConfig::default(),
             estimator: Estimator::Unbiased,
+            sampler: None,
+            seed: None,
             ..self.config.clone()
         };
         let mut text = state.to_json();
@@ -76,6 +100,50 @@ impl LoadedScene {
             text.push_str(&format!("{} {}\n", input.sha256, input.name));
         }
         sha256(text.as_bytes())
+    }
+
+    /// Takes another config over the same meshes: no file is read. On an error nothing changes.
+    ///
+    /// # Errors
+    /// Kind `Input` for a material that cannot be, as [`open`].
+    ///
+    /// # Panics
+    /// Where the config's meshes are others.
+    pub fn repaint(&mut self, config: SceneConfig) -> Result<()> {
+        assert_eq!(config.mesh_files, self.config.mesh_files, "other meshes have to be read");
+        let mut said = Vec::new();
+        let paint = |(old, declared): (&Material, &Option<MtlMaterial>)| {
+            paint(declared.as_ref(), &config, old.file, old.texture, &mut said)
+        };
+        self.mesh.materials =
+            self.mesh.materials.iter().zip(&self.declared).map(paint).collect::<Result<Vec<Material>>>()?;
+        self.config = config;
+        self.warnings = self.all_warnings(said);
+        Ok(())
+    }
+
+    /// The material at `index` as it is without its patch: albedo, emissive strength. `None` for the default grey.
+    pub fn unpatched(&self, index: usize) -> Option<(Vec3, f32)> {
+        let declared = self.declared.get(index)?.as_ref()?;
+        Some((own_albedo(declared, &mut Vec::new()), strength(declared, None)))
+    }
+
+    /// Everything to say: of the config, the files, the materials (`painted`), the patches, the emitters.
+    fn all_warnings(&self, painted: Vec<String>) -> Vec<String> {
+        let mut warnings = self.config.warnings();
+        if self.config.mesh_files.is_empty() {
+            warnings.push("scene.mesh_files is empty: the picture will be black".to_owned());
+        }
+        warnings.extend(self.file_warnings.iter().cloned());
+        warnings.extend(painted);
+        for (i, patch) in self.config.materials.iter().enumerate() {
+            if !self.known.contains(&patch.name) {
+                let near = suggestion(&patch.name, self.known.iter().map(String::as_str));
+                warnings.push(format!("scene.materials[{i}].name: no material is called {:?}{near}", patch.name));
+            }
+        }
+        warnings.extend(emitter_list(&self.mesh, &self.config));
+        warnings
     }
 }
 
@@ -88,56 +156,87 @@ pub fn open(config_path: &Path, options: &OpenOptions) -> Result<LoadedScene> {
     let bytes =
         inputs.read(config_path, &file_name(config_path), "a readable scene file (JSON)", config_path.display())?;
     let config = SceneConfig::parse(&bytes, &config_path.display().to_string(), &options.sets)?;
-    let mut warnings = config.warnings();
-    if config.mesh_files.is_empty() {
-        warnings.push("scene.mesh_files is empty: the picture will be black".to_owned());
-    }
     let places = search_places(config_path, &options.data)?;
+    assemble(config, inputs, &places, &config_path.display().to_string())
+}
+
+/// Reads everything that a config without a file of its own refers to; it is called `name` in messages.
+///
+/// Mesh files are looked for in `places`, in order. No file is read that does not lie in one of them, whatever the
+/// config, the meshes or their materials say, and nothing grows beyond `limits`: for scenes that come from strangers.
+///
+/// # Errors
+/// As [`open`], and kind `Input` for a file outside, and beyond the limits.
+pub fn open_within(config: SceneConfig, name: &str, places: &[PathBuf], limits: Limits) -> Result<LoadedScene> {
+    let folders = places.iter().filter_map(|place| place.canonicalize().ok()).collect();
+    let within = Within { folders, limits };
+    let own = InputFile { name: name.to_owned(), sha256: sha256(config.to_json().as_bytes()) };
+    assemble(config, Inputs { files: vec![own], within: Some(within) }, places, name)
+}
+
+/// Reads the meshes of `config` from `places`.
+fn assemble(config: SceneConfig, inputs: Inputs, places: &[PathBuf], called: &str) -> Result<LoadedScene> {
     let mut builder = Builder {
         config: &config,
         mesh: Mesh::default(),
         inputs,
-        warnings,
+        painted: Vec::new(),
+        said: Vec::new(),
         known: Vec::new(),
+        declared: Vec::new(),
         textures: HashMap::new(),
     };
     for (index, name) in config.mesh_files.iter().enumerate() {
-        let key = format!("{}: scene.mesh_files[{index}]", config_path.display());
-        let path = find_mesh(name, &places, &key)?;
+        let key = format!("{called}: scene.mesh_files[{index}]");
+        let path = find_mesh(name, places, &key)?;
         builder.add_file(index as u32, name, &path)?;
+        builder.check_triangles(name)?;
     }
-    builder.warn_of_unmatched_patches();
-    let Builder { mesh, inputs, mut warnings, .. } = builder;
-    warnings.extend(emitter_list(&mesh, &config));
-    Ok(LoadedScene { config, mesh, inputs: inputs.files, warnings })
+    let Builder { mesh, inputs, painted, said, known, declared, .. } = builder;
+    let (inputs, file_warnings) = (inputs.files, said);
+    let mut loaded = LoadedScene { config, mesh, inputs, warnings: Vec::new(), declared, known, file_warnings };
+    loaded.warnings = loaded.all_warnings(painted);
+    Ok(loaded)
 }
 
 fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-fn file_name(path: &Path) -> String {
+/// The last part of a path.
+pub fn file_name(path: &Path) -> String {
     path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
-}
-
-/// Reads `path`; `place` is where it is asked for.
-fn read_file(path: &Path, expected: &str, place: impl std::fmt::Display) -> Result<Vec<u8>> {
-    std::fs::read(path).map_err(|e| Error::input(&place, format!("expected {expected}, found {}: {e}", path.display())))
 }
 
 /// The files read so far.
 #[derive(Default)]
 struct Inputs {
     files: Vec<InputFile>,
+    /// Absent where files may be anywhere and of any size.
+    within: Option<Within>,
 }
 
 impl Inputs {
     /// Reads `path` and records it under `name`; `place` is where it is asked for.
     fn read(&mut self, path: &Path, name: &str, expected: &str, place: impl std::fmt::Display) -> Result<Vec<u8>> {
-        let bytes = read_file(path, expected, place)?;
+        let bytes = self.fetch(path, name, expected, place)?;
         let slot = self.reserve(name);
         self.settle(slot, sha256(&bytes));
         Ok(bytes)
+    }
+
+    /// Reads `path`, called `name` where it is asked for, at `place`; only from the folders that files must be within, if any are named.
+    fn fetch(&self, path: &Path, name: &str, expected: &str, place: impl std::fmt::Display) -> Result<Vec<u8>> {
+        if let Some(within) = &self.within {
+            // Links are followed before the question is asked.
+            let real = path.canonicalize().ok().filter(|real| real.is_file());
+            if !real.is_some_and(|real| within.folders.iter().any(|folder| real.starts_with(folder))) {
+                let what = format!("expected {expected} in a folder of this scene, found none there: {name:?}");
+                return Err(Error::input(&place, what));
+            }
+        }
+        std::fs::read(path)
+            .map_err(|e| Error::input(&place, format!("expected {expected}, found {}: {e}", path.display())))
     }
 
     /// Keeps the next place of the list for a file whose hash is not known yet.
@@ -156,7 +255,10 @@ impl Inputs {
 }
 
 /// The folders in which mesh files are looked for: beside the config, `data/` of each folder above, then `--data`.
-fn search_places(config_path: &Path, data: &[PathBuf]) -> Result<Vec<PathBuf>> {
+///
+/// # Errors
+/// Kind `Input` for a path that the system cannot make absolute.
+pub fn search_places(config_path: &Path, data: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let absolute = std::path::absolute(config_path)
         .map_err(|e| Error::input(config_path.display(), format!("expected a path to a file, found: {e}")))?;
     let beside = absolute.parent().unwrap_or(&absolute);
@@ -190,9 +292,14 @@ struct Builder<'a> {
     config: &'a SceneConfig,
     mesh: Mesh,
     inputs: Inputs,
-    warnings: Vec<String>,
+    /// What materials gave to say, with their patches.
+    painted: Vec<String>,
+    /// What files gave to say.
+    said: Vec<String>,
     /// Names of all materials declared, for patches.
     known: Vec<String>,
+    /// The declarations of the mesh's materials.
+    declared: Vec<Option<MtlMaterial>>,
     /// Textures by path.
     textures: HashMap<PathBuf, u32>,
 }
@@ -207,7 +314,7 @@ impl Builder<'_> {
                 format!("expected a mesh file of at most {MAX_MESH_BYTES} bytes, found {size}"),
             ));
         }
-        let bytes = read_file(path, "a readable mesh file", name)?;
+        let bytes = self.inputs.fetch(path, name, "a readable mesh file", name)?;
         let mut libraries: Vec<PathBuf> = Vec::new();
         // The OBJ stands before what it refers to.
         let slot = self.inputs.reserve(name);
@@ -215,21 +322,43 @@ impl Builder<'_> {
             || sha256(&bytes),
             || {
                 obj::read_obj(&bytes, name, |rest, place| {
-                    open_libraries(rest, place, path, &mut self.inputs, &mut self.warnings, &mut libraries)
+                    open_libraries(rest, place, path, &mut self.inputs, &mut self.said, &mut libraries)
                 })
             },
         );
         let obj = obj?;
         drop(bytes);
         self.inputs.settle(slot, hash);
-        self.warnings.extend(obj.warnings.iter().cloned());
+        self.said.extend(obj.warnings.iter().cloned());
         self.known.extend(obj.materials.iter().map(|m| m.name.clone()));
         if let Some(line) = obj.first_bare_face {
-            self.warnings.push(format!(
+            self.said.push(format!(
                 "{name}:{line}: faces before any usemtl have the default material, grey {DEFAULT_ALBEDO}"
             ));
         }
         self.add_faces(&obj, file, path)
+    }
+
+    /// Whether there are no more triangles than there may be.
+    fn check_triangles(&self, name: &str) -> Result<()> {
+        let (most, found) = (self.inputs.within.as_ref().map(|within| within.limits.triangles), self.mesh.len());
+        match most {
+            Some(most) if found > most => {
+                Err(Error::input(name, format!("expected at most {most} triangles in all here, found {found}")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether there are no more texels than there may be.
+    fn check_texels(&self, place: &str) -> Result<()> {
+        let found: u64 = self.mesh.textures.iter().map(|t| u64::from(t.width) * u64::from(t.height)).sum();
+        match self.inputs.within.as_ref().map(|within| within.limits.texels) {
+            Some(most) if found > most => {
+                Err(Error::input(place, format!("expected at most {most} texels in all here, found {found}")))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Adds the triangles of all faces, part by part, in their order.
@@ -251,6 +380,7 @@ impl Builder<'_> {
                     None => {
                         let material = self.material(id.map(|i| &obj.materials[i]), file, path)?;
                         self.mesh.materials.push(material);
+                        self.declared.push(id.map(|i| obj.materials[i].clone()));
                         let index = self.mesh.materials.len() as u32 - 1;
                         index_of.insert(id, index);
                         index
@@ -259,29 +389,17 @@ impl Builder<'_> {
                 self.mesh.material_of.resize(self.mesh.material_of.len() + count, index);
             }
         }
-        self.warnings.extend(told.warnings(name));
+        self.said.extend(told.warnings(name));
         Ok(())
     }
 
-    /// The material that `declared` and its patch make; without `declared`, the default grey, without a name.
+    /// The material that `declared` and its patch make, its texture read.
     fn material(&mut self, declared: Option<&MtlMaterial>, file: u32, obj_path: &Path) -> Result<Material> {
-        let Some(mtl) = declared else {
-            let (name, albedo) = (String::new(), Vec3::splat(DEFAULT_ALBEDO));
-            return Ok(Material { name, file, albedo, texture: None, emission: Vec3::ZERO, is_emitter: false });
-        };
-        let config = self.config;
-        let patch = config.materials.iter().find(|patch| patch.name == mtl.name);
-        let albedo = patch.and_then(|p| p.albedo_col).unwrap_or_else(|| own_albedo(mtl, &mut self.warnings));
-        let emission = emission(mtl, albedo, strength(mtl, patch))?;
-        let is_emitter = emission != Vec3::ZERO;
-        let texture = match &mtl.map_kd {
-            Some((place, name)) => Some(self.texture(&beside(obj_path, name), name, place)?),
-            None => None,
-        };
-        for note in notes(mtl, patch, albedo, is_emitter) {
-            self.warnings.push(format!("{}: {:?} {note}", mtl.place, mtl.name));
+        let mut material = paint(declared, self.config, file, None, &mut self.painted)?;
+        if let Some((place, name)) = declared.and_then(|mtl| mtl.map_kd.as_ref()) {
+            material.texture = Some(self.texture(&beside(obj_path, name), name, place)?);
         }
-        Ok(Material { name: mtl.name.clone(), file, albedo, texture, emission, is_emitter })
+        Ok(material)
     }
 
     /// The index of the texture at `path`, loaded at its first use.
@@ -295,18 +413,32 @@ impl Builder<'_> {
         })?;
         let index = self.mesh.textures.len() as u32;
         self.mesh.textures.push(texture);
+        self.check_texels(place)?;
         self.textures.insert(path.to_owned(), index);
         Ok(index)
     }
+}
 
-    fn warn_of_unmatched_patches(&mut self) {
-        for (i, patch) in self.config.materials.iter().enumerate() {
-            if !self.known.contains(&patch.name) {
-                let near = suggestion(&patch.name, self.known.iter().map(String::as_str));
-                self.warnings.push(format!("scene.materials[{i}].name: no material is called {:?}{near}", patch.name));
-            }
-        }
+/// The material that `declared` and its patch in `config` make; without `declared`, the default grey, without a name.
+fn paint(
+    declared: Option<&MtlMaterial>,
+    config: &SceneConfig,
+    file: u32,
+    texture: Option<u32>,
+    said: &mut Vec<String>,
+) -> Result<Material> {
+    let Some(mtl) = declared else {
+        let (name, albedo) = (String::new(), Vec3::splat(DEFAULT_ALBEDO));
+        return Ok(Material { name, file, albedo, texture: None, emission: Vec3::ZERO, is_emitter: false });
+    };
+    let patch = config.materials.iter().find(|patch| patch.name == mtl.name);
+    let albedo = patch.and_then(|p| p.albedo_col).unwrap_or_else(|| own_albedo(mtl, said));
+    let emission = emission(mtl, albedo, strength(mtl, patch))?;
+    let is_emitter = emission != Vec3::ZERO;
+    for note in notes(mtl, patch, albedo, is_emitter) {
+        said.push(format!("{}: {:?} {note}", mtl.place, mtl.name));
     }
+    Ok(Material { name: mtl.name.clone(), file, albedo, texture, emission, is_emitter })
 }
 
 /// Opens the libraries of one `mtllib` line: one name that may hold blanks or, where no such file exists, several.

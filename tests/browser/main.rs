@@ -7,6 +7,7 @@
 mod accessibility;
 mod chromium;
 mod report;
+mod view;
 
 use chromium::Browser;
 
