@@ -72,9 +72,9 @@ impl Inbox {
         if ask.is_change() {
             self.changes.fetch_add(1, Ordering::Relaxed);
         }
-        let is_full = waiting.asks.len() >= MAX_WAITING;
+        let (is_full, last_shown) = (waiting.asks.len() >= MAX_WAITING, waiting.shown.frame);
         match (waiting.asks.back_mut(), ask) {
-            (_, Ask::Shown { frame }) if frame > waiting.shown.frame => {
+            (_, Ask::Shown { frame }) if frame > last_shown => {
                 waiting.shown = Shown { frame, at: Some(Instant::now()) };
             }
             (_, Ask::Shown { .. }) => {}

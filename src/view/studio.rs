@@ -75,6 +75,8 @@ pub struct Studio {
     seen: u64,
     /// Counts pictures that began: what was measured of another is of no use.
     epoch: u64,
+    /// Counts documents that were told, so that a frame can say which it is of.
+    version: u64,
     changed: Instant,
     show: Showing,
     figures: SharedFigures,
@@ -123,6 +125,7 @@ impl Studio {
             passes: 0,
             seen: 0,
             epoch: 0,
+            version: 0,
             changed: now,
             show,
             figures: SharedFigures::default(),
@@ -299,6 +302,8 @@ impl Studio {
         {
             open.document = document;
             self.expose();
+            // Also where nothing of it is seen: the page then knows that what it shows is up to date.
+            self.show.is_stale = true;
             self.tell_state(moving);
             return Ok(());
         }
@@ -396,7 +401,7 @@ impl Studio {
         self.show.sent += 1;
         self.show.at = Instant::now();
         let panels: Vec<Value> = self.sides.iter().zip(&shown).map(|(side, s)| self.frame_header(side, s)).collect();
-        let header = json!({"is": "frame", "frame": self.show.sent, "epoch": self.epoch, "panels": panels});
+        let header = json!({"is": "frame", "frame": self.show.sent, "epoch": self.epoch, "version": self.version, "panels": panels});
         let bytes = shown.into_iter().map(|s| s.bytes).collect::<Vec<_>>().concat();
         self.outbox.send_bytes(&header, &bytes);
         (self.show.bytes, self.show.is_stale) = (bytes.len(), false);
@@ -435,9 +440,12 @@ impl Studio {
         self.show.is_stale |= self.view == View::Error;
     }
 
-    fn tell_state(&self, moving: bool) {
+    fn tell_state(&mut self, moving: bool) {
+        self.version += 1;
         if let Some(Open { document, loaded, scene }) = &self.open {
-            self.outbox.say(&state::whole(document, loaded, scene, moving));
+            let mut told = state::whole(document, loaded, scene, moving);
+            told["version"] = json!(self.version);
+            self.outbox.say(&told);
         }
     }
 

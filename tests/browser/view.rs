@@ -55,6 +55,7 @@ fn finished(page: &Page) {
     page.wait_for(
         "document.body?.dataset.connected === 'yes' && /finished|reference/.test(document.body.dataset.state)",
     );
+    page.wait_for("document.body.dataset.shown === document.body.dataset.version");
     page.wait_for("/ (\\d+) of \\1 spp$/.test(document.querySelector('#caption-a').textContent)");
 }
 

@@ -45,7 +45,7 @@ const link = new Link(
       $("#speed").textContent = number(flight.speed);
       if (state.notes) $("#notes").replaceChildren(...state.notes.map((text) => make("li", { textContent: text })));
       for (const option of $("#points-decision").options) option.disabled = !state.made.includes(option.value);
-      document.body.dataset.document = JSON.stringify(state.config);
+      Object.assign(document.body.dataset, { document: JSON.stringify(state.config), version: state.version });
     },
     frame(frame, bytes) {
       panels = frame.panels.length;
@@ -58,7 +58,7 @@ const link = new Link(
       arrange();
       if (document.body.dataset.frame === undefined && document.activeElement === document.body) screens[0].canvas.focus({ preventScroll: true });
       link.ask("shown", { frame: frame.frame });
-      Object.assign(document.body.dataset, { frame: frame.frame, epoch: frame.epoch, samples: frame.panels[0].samples });
+      Object.assign(document.body.dataset, { frame: frame.frame, epoch: frame.epoch, shown: frame.version, samples: frame.panels[0].samples });
     },
     status: showStatus,
     probe: showProbe,
