@@ -97,7 +97,7 @@ impl ScreenTable {
     #[inline]
     pub fn code(&self, radiance: f32) -> u8 {
         // Written so that what is no number is black.
-        if !(radiance > 0.0) {
+        if radiance.is_nan() || radiance <= 0.0 {
             return self.codes[0];
         }
         let bits = radiance.to_bits();

@@ -96,7 +96,7 @@ const MAX_REACH: f32 = 1e12;
 const MAX_STEEPNESS: f32 = 1e12;
 
 /// Bytes a triangle takes while the tree is built.
-const BUILD_BYTES: u64 = 384;
+const BUILD_BYTES: u64 = 424;
 
 /// Bytes a pixel takes: 32 for tiles' results and the image, or 36 for the image, its compressed blocks and the file.
 const PIXEL_BYTES: u64 = 36;
@@ -268,7 +268,8 @@ impl Scene {
     /// Bytes that making a scene of this mesh and rendering `pixels` of it take at most: known before the work starts.
     ///
     /// While the tree is built a triangle takes 100 bytes of the mesh, 36 of corners, 32 of its box, and in the builder 4 of an index,
-    /// 16 of keys to sort by, 96 of nodes that are merged and 96 of the tree's: [`BUILD_BYTES`]. Later, tree and faces take less.
+    /// 16 of keys to sort by, 96 of nodes that are merged and 96 of the tree's; and what was read of its file, some 40, may not be back
+    /// with the system yet: [`BUILD_BYTES`]. Later, tree and faces take less.
     pub fn most_bytes(mesh: &Mesh, pixels: u64) -> u64 {
         BUILD_BYTES * mesh.len() as u64
             + mesh.textures.iter().map(|texture| texture.bytes() as u64).sum::<u64>()

@@ -50,11 +50,7 @@ impl Told {
 /// Cuts the polygons of `faces`, a part of `obj`, into triangles. `normals` are the file's, brought to unit length by [`unit`].
 pub fn triangles(obj: &Obj, faces: &Faces, normals: &[Option<Vec3>]) -> Triangles {
     let mut made = Triangles::default();
-    // A polygon of n corners makes n - 2 triangles; no arities means triangles throughout.
-    let count = match faces.arities.len() {
-        0 => faces.corners.len() / 3,
-        polygons => faces.corners.len() - 2 * polygons,
-    };
+    let count = faces.most_triangles();
     made.positions.reserve_exact(count);
     made.normals.reserve_exact(count);
     made.uvs.reserve_exact(count);

@@ -14,7 +14,7 @@ use super::cut::{self, Told, Triangles};
 use super::json::suggestion;
 use super::light::luma;
 use super::mesh::{Material, Mesh, Texture};
-use super::obj::{self, MtlMaterial, Obj};
+use super::obj::{self, Faces, MtlMaterial, Obj};
 use crate::error::{Error, Result};
 use crate::film::srgb_decode;
 
@@ -29,6 +29,9 @@ const MAX_TEXELS: u64 = 1 << 26;
 
 /// Most bytes a mesh file, 2^30: reading takes about three times as much memory.
 const MAX_MESH_BYTES: u64 = 1 << 30;
+
+/// Parts of a file whose polygons are cut at a time.
+const PARTS_AT_ONCE: usize = 64;
 
 /// Where to look, and what to change, beyond the scene file itself.
 #[derive(Debug, Clone, Default)]
@@ -367,26 +370,29 @@ impl Builder<'_> {
         let normals: Vec<Option<Vec3>> = obj.normals.par_iter().map(|n| cut::unit(n.as_dvec3())).collect();
         let mut index_of: HashMap<Option<usize>, u32> = HashMap::new();
         let mut told = Told::default();
-        let parts: Vec<Triangles> = obj.faces.par_iter().map(|faces| cut::triangles(obj, faces, &normals)).collect();
-        self.mesh.reserve(parts.iter().map(|part| part.positions.len()).sum());
-        for part in parts {
-            self.mesh.positions.extend_from_slice(&part.positions);
-            self.mesh.normals.extend_from_slice(&part.normals);
-            self.mesh.uvs.extend_from_slice(&part.uvs);
-            told.add(part.told);
-            for (id, count) in part.runs.into_iter().filter(|(_, count)| *count > 0) {
-                let index = match index_of.get(&id) {
-                    Some(index) => *index,
-                    None => {
-                        let material = self.material(id.map(|i| &obj.materials[i]), file, path)?;
-                        self.mesh.materials.push(material);
-                        self.declared.push(id.map(|i| obj.materials[i].clone()));
-                        let index = self.mesh.materials.len() as u32 - 1;
-                        index_of.insert(id, index);
-                        index
-                    }
-                };
-                self.mesh.material_of.resize(self.mesh.material_of.len() + count, index);
+        self.mesh.reserve(obj.faces.iter().map(Faces::most_triangles).sum());
+        // Some at a time, so that a large mesh is not there twice.
+        for some in obj.faces.chunks(PARTS_AT_ONCE) {
+            let parts: Vec<Triangles> = some.par_iter().map(|faces| cut::triangles(obj, faces, &normals)).collect();
+            for part in parts {
+                self.mesh.positions.extend_from_slice(&part.positions);
+                self.mesh.normals.extend_from_slice(&part.normals);
+                self.mesh.uvs.extend_from_slice(&part.uvs);
+                told.add(part.told);
+                for (id, count) in part.runs.into_iter().filter(|(_, count)| *count > 0) {
+                    let index = match index_of.get(&id) {
+                        Some(index) => *index,
+                        None => {
+                            let material = self.material(id.map(|i| &obj.materials[i]), file, path)?;
+                            self.mesh.materials.push(material);
+                            self.declared.push(id.map(|i| obj.materials[i].clone()));
+                            let index = self.mesh.materials.len() as u32 - 1;
+                            index_of.insert(id, index);
+                            index
+                        }
+                    };
+                    self.mesh.material_of.resize(self.mesh.material_of.len() + count, index);
+                }
             }
         }
         self.said.extend(told.warnings(name));

@@ -69,6 +69,16 @@ pub struct Faces {
     pub runs: Vec<(Option<usize>, usize)>,
 }
 
+impl Faces {
+    /// Triangles that they make, before those without area are left out: n − 2 of a polygon of n corners.
+    pub fn most_triangles(&self) -> usize {
+        match self.arities.len() {
+            0 => self.corners.len() / 3,
+            polygons => self.corners.len() - 2 * polygons,
+        }
+    }
+}
+
 /// What an OBJ file holds.
 #[derive(Debug, Default, PartialEq)]
 pub struct Obj {

@@ -103,6 +103,7 @@ impl Piece {
                 break;
             }
         }
+        reader.piece.corners.shrink_to_fit();
         reader.piece
     }
 }
