@@ -79,7 +79,7 @@ impl HaltonAxis {
                 let offset = (((draws[lane] & 0xffff_ffff) * u64::from(b)) >> 32) as u32;
                 let moved = factor * digit + offset;
                 mirror[lane] = mirror[lane] * b + (moved - self.by_base.of_small(moved) * b);
-                prefix[lane] += if planted(Mutant::DigitsNotNested) { 0 } else { digit * power };
+                prefix[lane] += in_prefix(digit * power);
             }
             power *= b;
         }
@@ -237,11 +237,17 @@ pub fn digit_scrambled(base: u32, digits: u32, index: u32, key: u64) -> u32 {
         let factor = 1 + (((draw >> 32) * (b - 1)) >> 32) as u32;
         let offset = (((draw & 0xffff_ffff) * b) >> 32) as u32;
         mirror = mirror * b + u64::from((factor * digit + offset) % base);
-        prefix += if planted(Mutant::DigitsNotNested) { 0 } else { u64::from(digit) * power };
+        prefix += in_prefix(u64::from(digit) * power);
         power *= b;
     }
     let tail = bits64(key, prefix | (u64::from(digits) << 40)) >> 32;
     (((mirror << 32) | tail) / power) as u32
+}
+
+/// What a digit adds to the prefix on which those after it depend: itself.
+#[inline(always)]
+fn in_prefix<T: Default>(digit: T) -> T {
+    if planted(Mutant::DigitsNotNested) { T::default() } else { digit }
 }
 
 #[cfg(test)]
