@@ -82,7 +82,7 @@ impl Server {
     /// # Errors
     /// Kind `Input` for a scene that cannot be shown, a port that is taken, or a `--data` that is no folder.
     pub fn bind(options: &Options) -> Result<Self> {
-        for folder in options.data.iter().filter(|folder| !folder.is_dir()) {
+        if let Some(folder) = options.data.iter().find(|folder| !folder.is_dir()) {
             return Err(Error::input("--data", format!("expected a folder, found {}", folder.display())));
         }
         let first = Document::first(options)?;
