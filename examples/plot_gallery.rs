@@ -106,9 +106,11 @@ fn pareto(folder: &Path) -> Result<()> {
         }
     }
     let frame = frame("Speed against accuracy", "render time (s, median of 8)", "RMSE (radiance)");
-    pareto_chart(&frame, &trials).write(folder, "pareto")?;
-    pareto_chart(&frame, &trials[..1]).write(folder, "pareto-one")?;
-    pareto_chart(&frame, &[]).write(folder, "pareto-empty")
+    let peers: Vec<Trial> =
+        (0..5).map(|i| Trial::of_peer(["one program", "another"][i % 2], i % 2, 0.02 * (i + 1) as f64, 0.04)).collect();
+    pareto_chart(&frame, &trials, &peers).write(folder, "pareto")?;
+    pareto_chart(&frame, &trials[..1], &[]).write(folder, "pareto-one")?;
+    pareto_chart(&frame, &[], &[]).write(folder, "pareto-empty")
 }
 
 fn bias_variance(folder: &Path) -> Result<()> {

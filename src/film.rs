@@ -10,7 +10,11 @@ mod screen;
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
+use exr::block::writer::ChunksWriter;
+use exr::block::{BlockIndex, UncompressedBlock, enumerate_ordered_header_block_indices};
+use exr::image::write::layers::{LayersWriter, WritableLayers};
 use exr::prelude::*;
+use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 
@@ -97,7 +101,21 @@ const ATTRIBUTE_PREFIX: &str = "sampler_lab.";
 /// # Errors
 /// Kind `Write` where the file cannot be written.
 pub fn write_exr(path: &Path, image: &Image, provenance: &[(String, String)]) -> Result<()> {
-    let bytes = exr_bytes(image, provenance).map_err(|e| Error::write(path, format!("cannot encode EXR: {e}")))?;
+    write_exr_as(path, image, provenance, Compression::ZIP16)
+}
+
+/// As [`write_exr`], without compression: for images that are read once by the program itself, since noise in `f32` hardly
+/// shrinks and compressing it takes longer than to measure it.
+///
+/// # Errors
+/// As [`write_exr`].
+pub fn write_exr_plain(path: &Path, image: &Image, provenance: &[(String, String)]) -> Result<()> {
+    write_exr_as(path, image, provenance, Compression::Uncompressed)
+}
+
+fn write_exr_as(path: &Path, image: &Image, provenance: &[(String, String)], compression: Compression) -> Result<()> {
+    let bytes = exr_bytes_as(image, provenance, compression)
+        .map_err(|e| Error::write(path, format!("cannot encode EXR: {e}")))?;
     write_renamed(path, &bytes, false)
 }
 
@@ -106,6 +124,14 @@ pub fn write_exr(path: &Path, image: &Image, provenance: &[(String, String)]) ->
 /// # Errors
 /// What the encoder says.
 pub fn exr_bytes(image: &Image, provenance: &[(String, String)]) -> std::result::Result<Vec<u8>, String> {
+    exr_bytes_as(image, provenance, Compression::ZIP16)
+}
+
+fn exr_bytes_as(
+    image: &Image,
+    provenance: &[(String, String)],
+    compression: Compression,
+) -> std::result::Result<Vec<u8>, String> {
     let size = Vec2(image.width as usize, image.height as usize);
     let channels = SpecificChannels::rgb(|at: Vec2<usize>| {
         let [r, g, b] = image.pixels[at.y() * image.width as usize + at.x()];
@@ -117,11 +143,31 @@ pub fn exr_bytes(image: &Image, provenance: &[(String, String)]) -> std::result:
         let name = Text::from(format!("{ATTRIBUTE_PREFIX}{name}").as_str());
         layer.other.insert(name, AttributeValue::Text(Text::from(value.as_str())));
     }
-    let encoding = Encoding { compression: Compression::ZIP16, ..Encoding::default() };
+    let encoding = Encoding { compression, ..Encoding::default() };
     let file = exr::prelude::Image::from_layer(Layer::new(size, layer, encoding, channels));
+    let bytes = encode_exr(&file).map_err(|e| e.to_string())?;
+    with_sorted_attributes(bytes).ok_or_else(|| "its header does not read back".to_owned())
+}
+
+/// The file's bytes. As the package's own writer makes them, with the blocks compressed side by side and written in their order.
+fn encode_exr<'a, L: WritableLayers<'a>>(file: &'a exr::prelude::Image<L>) -> exr::error::Result<Vec<u8>> {
+    let headers = file.write().infer_meta_data();
+    let layers = file.layer_data.create_writer(&headers);
     let mut bytes = Cursor::new(Vec::new());
-    file.write().non_parallel().to_buffered(&mut bytes).map_err(|e| e.to_string())?;
-    with_sorted_attributes(bytes.into_inner()).ok_or_else(|| "its header does not read back".to_owned())
+    exr::block::write(&mut bytes, headers, true, |meta, chunks| {
+        let blocks: Vec<_> = enumerate_ordered_header_block_indices(&meta.headers).collect();
+        let compress = |&(number, index): &(usize, BlockIndex)| {
+            let data = layers.extract_uncompressed_block(&meta.headers, index);
+            Ok((number, UncompressedBlock { index, data }.compress_to_chunk(&meta.headers)?))
+        };
+        let compressed: Vec<exr::error::Result<_>> = blocks.par_iter().map(compress).collect();
+        for chunk in compressed {
+            let (number, chunk) = chunk?;
+            chunks.write_chunk(number, chunk)?;
+        }
+        Ok(())
+    })?;
+    Ok(bytes.into_inner())
 }
 
 /// Puts the attributes of a single-part OpenEXR file into the order of their names.
@@ -211,7 +257,8 @@ pub fn png_rgb8_bytes(width: u32, height: u32, bytes: &[u8]) -> std::result::Res
             .map_err(|e| e.to_string())?;
         Ok::<_, String>(png)
     };
-    let (filtered, plain) = (encoded(FilterType::Adaptive)?, encoded(FilterType::NoFilter)?);
+    let (filtered, plain) = rayon::join(|| encoded(FilterType::Adaptive), || encoded(FilterType::NoFilter));
+    let (filtered, plain) = (filtered?, plain?);
     Ok(if plain.len() < filtered.len() { plain } else { filtered })
 }
 
@@ -245,6 +292,25 @@ mod tests {
         }
         assert_eq!(read_exr(&path).unwrap(), (image, provenance));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no partial file is left");
+    }
+
+    /// The package's own writer, one block after another, is the model.
+    #[test]
+    fn blocks_compressed_side_by_side_make_the_same_file() {
+        let mut image = Image::black(37, 83);
+        for (i, p) in image.pixels.iter_mut().enumerate() {
+            *p = [(i % 19) as f32, i as f32 * 0.37, 1.0 / (1 + i) as f32];
+        }
+        let channels = SpecificChannels::rgb(|at: Vec2<usize>| {
+            let [r, g, b] = image.pixels[at.y() * 37 + at.x()];
+            (r, g, b)
+        });
+        let encoding = Encoding { compression: Compression::ZIP16, ..Encoding::default() };
+        let layer = Layer::new(Vec2(37, 83), LayerAttributes::default(), encoding, channels);
+        let file = exr::prelude::Image::from_layer(layer);
+        let mut one_by_one = Cursor::new(Vec::new());
+        file.write().non_parallel().to_buffered(&mut one_by_one).unwrap();
+        assert_eq!(encode_exr(&file).unwrap(), one_by_one.into_inner());
     }
 
     #[test]

@@ -83,6 +83,8 @@ const DOORS: &[(&str, &[&str])] = &[
     ("serde_json", &["main", "experiment", "scene", "view"]),
     ("plotters", &["report"]),
     ("ttf_noto_sans", &["report"]),
+    ("pulldown_cmark", &["report"]),
+    ("miniz_oxide", &["report"]),
     ("obvhs", &["accel"]),
     // Benchmarks time it alone, beside the scene's loader.
     ("tobj", &["scene", "bench"]),
@@ -92,7 +94,7 @@ const DOORS: &[(&str, &[&str])] = &[
     ("rand", &["stats"]),
     ("rand_pcg", &["stats"]),
     ("statrs", &["stats"]),
-    ("sha2", &["scene", "experiment"]),
+    ("sha2", &["scene", "experiment", "report"]),
     ("tungstenite", &["view"]),
     ("httparse", &["view"]),
     ("getrandom", &["view"]),

@@ -343,6 +343,7 @@ fn what_is_no_scene_at_all_is_refused() {
 /// Arguments, and what the message has to say: the place, what was expected, what was found.
 const BAD_ARGUMENTS: &[(&[&str], &[&str])] = &[
     (&["render", "a.json", "--sampler", "halten"], &["sampler \"halten\"", "expected a point set", "mean \"halton\"?"]),
+    (&["render", "a.json", "--kernel", "sse"], &["--kernel: expected one of scalar, avx2, avx512, found \"sse\""]),
     (&["render", "a.json", "--sampler", "ld:stepp"], &["expected an order or preset", "did you mean \"step\"?"]),
     (&["render", "a.json", "--sampler", "halton:joint:owen"], &["expected halton:(", "found halton:joint:owen"]),
     (

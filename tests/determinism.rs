@@ -1,12 +1,17 @@
 //! The same scene and numbers give the same bits: on any number of threads, pixel by pixel, sample by sample, today and after
 //! the next change.
 
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
 use glam::Vec3;
-use sampler_lab::accel;
+use sampler_lab::accel::{self, Kernel};
 use sampler_lab::check::room::{Room, ceiling, looking_at, spec};
 use sampler_lab::film::Image;
-use sampler_lab::render::{self, render, render_sample};
-use sampler_lab::sampling::{self, PointSource, Points, Sampler, SamplerSpec, every_legal_spec};
+use sampler_lab::render::{self, draw_numbers, render, render_sample};
+use sampler_lab::sampling::{
+    self, Dim1, Dim2, PixelKey, PointSource, Points, Preset, Sampler, SamplerSpec, every_legal_spec,
+};
 use sampler_lab::scene::compile::{Scene, Stage};
 use sampler_lab::scene::config::Estimator;
 use sha2::{Digest, Sha256};
@@ -53,6 +58,73 @@ fn one_two_and_seven_threads_give_the_same_bytes_for_every_sampler() {
         lit += one.iter().filter(|&&b| b != 0).count();
     }
     assert!(lit > 1000, "the images are not black");
+}
+
+/// Those that this processor has. Counts that fill no packet.
+#[test]
+fn every_kernel_gives_the_same_bytes_on_one_thread_and_on_two() {
+    let pools = [1, 2].map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap());
+    for stage in Stage::ALL {
+        let mut scene = scene(stage);
+        let names: &[&str] = if stage == Stage::Start { &["center"] } else { &["uniform", "sobol", "halton", "ld"] };
+        for name in names {
+            let sampler = Sampler::new(spec(name), &scene.layout, 21, 7).unwrap();
+            let mut images = Vec::new();
+            for kernel in Kernel::available() {
+                scene.accel.set_kernel(kernel);
+                images.extend(pools.iter().map(|pool| (kernel, pool.install(|| bits(&image(&scene, &sampler))))));
+            }
+            let first = &images[0].1;
+            assert!(first.iter().any(|&b| b != 0), "{stage:?}, {name}: black");
+            for (kernel, found) in &images {
+                assert!(found == first, "{stage:?}, {name}: {kernel} gives other bits than {}", images[0].0);
+            }
+        }
+    }
+}
+
+/// Numbers that somebody asked for: pixel, decision and index, with how often.
+struct Asked<'a> {
+    sampler: &'a Sampler,
+    seen: Mutex<BTreeMap<(u64, &'static str, u32), u32>>,
+}
+
+impl Asked<'_> {
+    fn note(&self, pixel: PixelKey, decision: &'static str, first: u32, count: usize) {
+        let mut seen = self.seen.lock().unwrap();
+        (first..first + count as u32).for_each(|i| *seen.entry((pixel.word(), decision, i)).or_default() += 1);
+    }
+}
+
+impl PointSource for Asked<'_> {
+    fn samples(&self) -> u32 {
+        self.sampler.samples()
+    }
+
+    fn fill_1d(&self, pixel: PixelKey, first: u32, dim: &Dim1, out: &mut [f32]) {
+        self.note(pixel, dim.decision().name(), first, out.len());
+        self.sampler.fill_1d(pixel, first, dim, out);
+    }
+
+    fn fill_2d(&self, pixel: PixelKey, first: u32, dim: &Dim2, x: &mut [f32], y: &mut [f32]) {
+        self.note(pixel, dim.decision().name(), first, x.len());
+        self.sampler.fill_2d(pixel, first, dim, x, y);
+    }
+}
+
+#[test]
+fn the_numbers_drawn_alone_are_those_of_the_image_each_once() {
+    for (stage, decisions) in [(Stage::Final, 4), (Stage::Dof, 2)] {
+        let scene = scene(stage);
+        let sampler = Sampler::new(SamplerSpec::parse("ld", Preset::Best).unwrap(), &scene.layout, 21, 5).unwrap();
+        let asked = || Asked { sampler: &sampler, seen: Mutex::default() };
+        let (image, alone) = (asked(), asked());
+        render(&scene, &image).unwrap();
+        draw_numbers(&scene, &alone);
+        let (image, alone) = (image.seen.into_inner().unwrap(), alone.seen.into_inner().unwrap());
+        assert_eq!(alone.len(), 11 * 9 * sampler.samples() as usize * decisions);
+        assert!(alone.values().all(|&times| times == 1) && image == alone);
+    }
 }
 
 /// A pixel is the f64 sum of its samples in the order of their indices, over their count, rounded once.

@@ -3,6 +3,7 @@
 //! `tests/data/report/` was made by the tool from `small.json` beside it. Where the report's words change on purpose,
 //! `REGENERATE=1 cargo test --test report` writes the expected file anew: read its difference before committing it.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use sampler_lab::experiment::execute::{Options, execute};
@@ -10,9 +11,11 @@ use sampler_lab::experiment::lab::Lab;
 use sampler_lab::experiment::plan::plan;
 use sampler_lab::experiment::progress::Silent;
 use sampler_lab::experiment::results::{
-    EnsembleRow, ErrorSpectrum, Growth, Kind, ReferenceRow, Row, Timing, read, read_about, read_timings, timings_path,
+    EnsembleRow, ErrorSpectrum, Growth, Kind, PeerPoint, Peers, ReferenceRow, Rounds, Row, Size, Timing, read,
+    read_about, read_timings, timings_path,
 };
-use sampler_lab::experiment::spec::Experiment;
+use sampler_lab::experiment::spec::{Experiment, TimedRounds};
+use sampler_lab::report::page::viewer;
 use sampler_lab::report::{Figures, Measurements, Summary, summarise, text, text_with, write};
 use sampler_lab::stats::Estimate;
 
@@ -500,6 +503,68 @@ fn every_heading_of_a_report_is_in_its_table_of_contents() {
     assert!(listed.eq(headings), "{list}");
 }
 
+/// The stored rows with rounds: 1 ms a sample per pixel for independent points, 1.1 ms for others, each round up to 4 % off;
+/// numbers take a tenth of it, those of Halton's sets half.
+fn with_rounds() -> Summary {
+    let rows = rows();
+    let mut timings = timings();
+    for timing in &mut timings {
+        let image = rows.iter().find_map(|row| match row {
+            Row::Image(row) if row.id == timing.id && row.kind == Kind::Render && row.replicate == 0 => Some(row),
+            _ => None,
+        });
+        let Some(row) = image else { continue };
+        let base = 1e-3 * f64::from(row.spp.taken) * if row.sampler.starts_with("uniform") { 1.0 } else { 1.1 };
+        let seconds: Vec<f64> = (0..9).map(|i| base * (0.96 + 0.01 * f64::from(i * 5 % 9))).collect();
+        let share = if row.sampler.starts_with("halton") { 0.5 } else { 0.1 };
+        let numbers = seconds.iter().map(|s| share * s).collect();
+        timing.again = Some(Rounds { host: "h".to_owned(), threads: 2, seconds, numbers, load: Vec::new() });
+    }
+    let mut about = read_about(&stored().join("experiment.json")).unwrap();
+    let rmse = BTreeMap::from([("a01".to_owned(), vec![1e-5, 0.1])]);
+    about.experiment.timing = Some(TimedRounds { rounds: 9, spp: vec![4, 16, 64], rmse });
+    let point = |name: &str, scene: &str| PeerPoint {
+        name: name.to_owned(),
+        scene: scene.to_owned(),
+        size: Size { width: 32, height: 18 },
+        spp: 64,
+        seconds: 0.4,
+        seconds_range: Some([0.3, 0.5]),
+        rmse: 0.05,
+        rmse_range: None,
+        machine: "a mill".to_owned(),
+        date: "2026-11-25".to_owned(),
+    };
+    let points = vec![point("Other 1.0", "a01"), point("Other 1.0", "elsewhere")];
+    about.experiment.peers = Some(Peers { file: "peers.json".to_owned(), note: Some("n".to_owned()), points });
+    summarise(&rows, &timings, &about)
+}
+
+#[test]
+fn seconds_come_from_rounds_with_the_share_of_sampling_and_the_time_to_a_stated_error() {
+    let summary = with_rounds();
+    let report = text(&summary, &Figures::default());
+    assert!(summary.speeds.iter().all(|speed| speed.is_in_rounds && speed.timings == 9));
+    let uniform = summary.speeds.iter().find(|s| s.sampler == 0 && s.spp.asked == 64).unwrap();
+    // The middle of nine, between the second and the eighth.
+    let Estimate { value, ci95: Some([low, high]) } = uniform.seconds else { panic!() };
+    assert!((value - 0.064).abs() < 1e-12 && (low - 0.97 * 0.064).abs() < 1e-12 && (high - 1.03 * 0.064).abs() < 1e-12);
+    assert!(report.contains("medians of 9 rounds"), "{report}");
+    // Within rounds that go up and down by 4 %, both times do, and the share stays.
+    assert!(report.contains("drawing numbers takes from 10 % ") && report.contains(" to 50 % "), "{report}");
+    let row = report.lines().find(|line| line.starts_with("| `uniform` |") && line.contains("not reached (")).unwrap();
+    assert!(row.contains(" at 64 spp) | 1 |"), "the second level is reached, the first is not: {row}");
+    assert!(report.contains("RMSE 1.00e−5 in `a01`: no sampler that nothing speaks against gets there"), "{report}");
+    assert!(report.contains("RMSE 0.100 in `a01`: ") && report.contains("**Who gets there first**"));
+    // A fourth of the pixels, so a fourth of the seconds.
+    assert!(
+        report.contains(
+            "| Other 1.0 | `a01` | 64 | 32x18 | 0.400 [0.300, 0.500] | 0.100 | 0.0500 | a mill, 2026-11-25 |"
+        )
+    );
+    assert!(report.contains("The file says: n. 1 point of scenes that are not here is left out."), "{report}");
+}
+
 /// Two picture scenes with a ladder of counts, none with a lens; images large enough for details.
 const PICTURED: &str = r#"{
     "name": "pictured", "seed": 5, "scenes": ["cornell", "penumbra"], "size": "4x4",
@@ -567,10 +632,58 @@ fn every_picture_scene_has_its_strips_and_equal_time_takes_the_count_that_costs_
     assert!(lines[0].starts_with("| `uniform:best` | 2 | 2.00 | 1.00 |"), "{lines:?}");
     assert!(lines[1].starts_with("| `ld:best` | 4 | 2.00 | 1.00 |"), "{lines:?}");
     assert!(page.contains("`cornell` in three stages"), "a scene without a lens has no stage for it");
-    // Without the images the figures stay, and so do the words.
+    let html = std::fs::read(folder.path().join("report.html")).unwrap();
+    // Without the images the figures stay, and so do the words and the pictures of the page.
     std::fs::remove_dir_all(folder.path().join("images")).unwrap();
     write(folder.path()).unwrap();
     assert_eq!(std::fs::read_to_string(&written.report).unwrap(), page);
+    assert!(std::fs::read(folder.path().join("report.html")).unwrap() == html, "the viewer's pictures are kept");
+}
+
+#[test]
+fn the_page_has_the_text_the_figures_and_a_viewer_of_each_picture_scene_and_nothing_from_outside() {
+    let folder = pictured();
+    write(folder.path()).unwrap();
+    let path = folder.path().join("report.html");
+    let page = std::fs::read_to_string(&path).unwrap();
+    assert_eq!(page.matches("<section class=\"viewer\"").count(), 2);
+    // A reference, two samplers at equal samples, and ld:best's other count at equal time, in each.
+    assert_eq!(page.matches("class=\"picture\" data-label=").count(), 2 * 4);
+    let markdown = std::fs::read_to_string(folder.path().join("report.md")).unwrap();
+    assert_eq!(page.matches("<img class=").count(), markdown.matches("![Figure ").count());
+    assert_eq!(page.matches("<table>").count(), markdown.lines().filter(|line| line.starts_with("| ---")).count());
+    // Whatever an attribute names is in the page or in its address.
+    for attribute in ["src=\"", "href=\""] {
+        for piece in page.split(attribute).skip(1) {
+            assert!(piece.starts_with("data:") || piece.starts_with('#'), "{attribute}{}", &piece[..40]);
+        }
+    }
+    assert!(!page.contains("http://") && !page.contains("https://"), "an address of the network");
+    // A viewer that may take fewer letters leaves out the pictures at equal time, then all but the middle of each.
+    let summary = write(folder.path()).unwrap().summary;
+    let viewer = |letters| viewer::html(folder.path(), &summary, &summary.pictured[0], letters).unwrap();
+    let count = |html: &str| html.matches("class=\"picture\"").count();
+    let whole = viewer(viewer::MOST_LETTERS);
+    let some = viewer(whole.len() - 1);
+    let middle = viewer(some.len() * 2 / 3);
+    assert_eq!([count(&whole), count(&some), count(&middle)], [4, 3, 3]);
+    assert!(whole.contains("data-note=\"\"") && some.contains("data-note=\"The pictures at equal time are left out"));
+    assert!(middle.contains("data-note=\"Of 88 × 30 pixels the middle is here") && middle.len() <= some.len() * 2 / 3);
+    // Another folder of the same rows and images has the same bytes; one without images or an earlier page says so.
+    write(folder.path()).unwrap();
+    assert!(std::fs::read_to_string(&path).unwrap() == page);
+    std::fs::remove_dir_all(folder.path().join("images")).unwrap();
+    let hostile = page.replace("data-label=\"reference\"", "data-label=\"<b>reference</b>\"");
+    for earlier in [None, Some(hostile), Some(page.replace("<!-- viewer ", "<!-- viewer 0"))] {
+        match &earlier {
+            None => std::fs::remove_file(&path).unwrap(),
+            Some(earlier) => std::fs::write(&path, earlier).unwrap(),
+        }
+        write(folder.path()).unwrap();
+        let page = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(page.matches("The flip viewer has no pictures here.").count(), 2);
+        assert!(!page.contains("<b>reference"));
+    }
 }
 
 #[test]

@@ -39,6 +39,7 @@ def main():
     arguments.add_argument("--work", required=True, help="folder for what is made on the way")
     arguments.add_argument("--variant", default="llvm_ad_rgb")
     arguments.add_argument("--repeats", type=int, default=7)
+    arguments.add_argument("--points", help="file for the points of every sampler, as an experiment's `peers` reads them")
     arguments.add_argument("--only", choices=[s[0] for s in SCENES])
     args = arguments.parse_args()
 
@@ -62,6 +63,7 @@ def main():
     processor = next((l.split(":")[1].strip() for l in open("/proc/cpuinfo") if l.startswith("model name")), "?")
     print(f"Mitsuba {mi.__version__} ({args.variant}), {processor}, {os.cpu_count()} threads, {platform.system()},", end=" ")
     print(time.strftime("%Y-%m-%d"), flush=True)
+    points = []
     ratio_line = lambda r: f"{statistics.median(r):.2f} ({min(r):.2f} to {max(r):.2f})"
 
     for name, spp, reference_spp in [s for s in SCENES if args.only in (None, s[0])]:
@@ -124,9 +126,36 @@ def main():
             seconds, error = (statistics.median(c) for c in zip(*runs[1:]))
             cost = statistics.median([s * e * e for s, e in runs[1:]])
             best[program] = min(best.get(program, float("inf")), cost)
+            if mask.all():  # An error over some of the pixels is not what an experiment's figure shows.
+                points.append(point(f"Mitsuba {mi.__version__}" if program == "Mitsuba" else "sampler-lab (peers' run)", sampler, name,
+                                    config["framebuffer"], taken, runs[1:], processor))
             print(f"| {program}: {sampler} | {taken} | {seconds:.3f} | {error:.5f} | {cost:.3e} |")
         print(f"\nRMSE² · s at 64 spp, best of each program: ours {best['ours']:.3e}, Mitsuba {best['Mitsuba']:.3e}, "
               f"ratio {best['Mitsuba'] / best['ours']:.2f}", flush=True)
+
+    if args.points and points:
+        write_points(args.points, points)
+
+
+def point(program, sampler, scene, framebuffer, spp, runs, processor):
+    """One program, sampler and scene: medians and ranges over the runs."""
+    seconds, errors = zip(*runs)
+    digits = lambda x: float(f"{x:.4g}")
+    return {
+        "name": f"{program} {sampler}", "scene": scene, "size": f"{framebuffer['res_w']}x{framebuffer['res_h']}", "spp": int(spp),
+        "seconds": digits(statistics.median(seconds)), "seconds_range": [digits(min(seconds)), digits(max(seconds))],
+        "rmse": digits(statistics.median(errors)), "rmse_range": [digits(min(errors)), digits(max(errors))],
+        "machine": f"{processor}, {os.cpu_count()} threads", "date": time.strftime("%Y-%m-%d"),
+    }
+
+
+def write_points(path, points):
+    """Whole or not at all."""
+    note = "warm renders, medians and ranges"
+    with open(path + ".partial", "w") as file:
+        lines = ",\n    ".join(json.dumps(p, ensure_ascii=False) for p in points)
+        file.write(f"{{\n  \"note\": {json.dumps(note)},\n  \"points\": [\n    {lines}\n  ]\n}}\n")
+    os.replace(path + ".partial", path)
 
 
 main()

@@ -21,4 +21,4 @@ if ! (cd "$here" && "$work/venv/bin/python" -B probe.py) >"$work/probe.log" 2>&1
     variant=scalar_rgb
 fi
 cd "$here" && exec "$work/venv/bin/python" -B mitsuba_peer.py --binary "$binary" --scenes "$work/scenes" --work "$work/mitsuba" \
-    --variant "$variant" "$@"
+    --variant "$variant" --points "$work/points.json" "$@"

@@ -1,17 +1,15 @@
 //! Packets in 512-bit registers: one for each coordinate of all 16 rays.
 //!
 //! The operations and their order are those of [`slab`](super::slab) and [`meet`](super::meet), written as instructions; what differs from the
-//! portable kernel is the bookkeeping: masks stay masks, both children of a node are tested together, and a packet whose rays
-//! all run into one octant knows which planes of a box are the near ones.
+//! portable kernel is the bookkeeping: masks stay masks, the packet's [`Beam`] is tested against eight boxes before any ray is, and a packet
+//! whose rays all run into one octant knows which planes of a box are the near ones.
 
 use std::arch::x86_64::*;
 
-use super::Bounds;
-use super::build::{Accel, Slot};
-use super::packet::{LANES, NOTHING, Packet, Row, STACK};
-
-/// Octant of a packet whose rays differ in the sign of a coordinate.
-const MIXED: u8 = 8;
+use super::beam::{Beam, Bundle, MIXED};
+use super::build::Accel;
+use super::packet::{LANES, NOTHING, Packet, Row};
+use super::packet_tree::{Corners, PacketTree, Planes};
 
 /// Three coordinates of 16 vectors.
 #[derive(Clone, Copy)]
@@ -97,48 +95,49 @@ impl Rays {
     /// Where each lane enters and leaves a box.
     #[inline]
     #[target_feature(enable = "avx512f")]
-    fn slab<const OCTANT: u8>(&self, bounds: &Bounds) -> (__m512, __m512) {
-        let (nx, fx) = axis::<OCTANT, 0>(bounds.min.x, bounds.max.x, self.origin.x, self.reciprocal.x);
-        let (ny, fy) = axis::<OCTANT, 1>(bounds.min.y, bounds.max.y, self.origin.y, self.reciprocal.y);
-        let (nz, fz) = axis::<OCTANT, 2>(bounds.min.z, bounds.max.z, self.origin.z, self.reciprocal.z);
+    fn slab<const OCTANT: u8>(&self, planes: &Planes, place: usize) -> (__m512, __m512) {
+        let (nx, fx) = axis::<OCTANT, 0>(planes[0][place], planes[1][place], self.origin.x, self.reciprocal.x);
+        let (ny, fy) = axis::<OCTANT, 1>(planes[2][place], planes[3][place], self.origin.y, self.reciprocal.y);
+        let (nz, fz) = axis::<OCTANT, 2>(planes[4][place], planes[5][place], self.origin.z, self.reciprocal.z);
         (_mm512_max_ps(_mm512_max_ps(nx, ny), nz), _mm512_min_ps(_mm512_min_ps(fx, fy), fz))
     }
 
-    /// Which lanes meet a box no farther than their limit; and where each enters it, 0 at the least.
+    /// Which lanes meet a box no farther than their limit.
     #[inline]
     #[target_feature(enable = "avx512f")]
-    fn meets<const OCTANT: u8>(&self, bounds: &Bounds) -> (u16, __m512) {
-        let (near, far) = self.slab::<OCTANT>(bounds);
+    fn meets<const OCTANT: u8>(&self, planes: &Planes, place: usize) -> u16 {
+        let (near, far) = self.slab::<OCTANT>(planes, place);
         let near = _mm512_max_ps(near, _mm512_setzero_ps());
-        (_mm512_cmp_ps_mask::<_CMP_LE_OQ>(near, _mm512_min_ps(far, self.limit)), near)
+        _mm512_cmp_ps_mask::<_CMP_LE_OQ>(near, _mm512_min_ps(far, self.limit))
     }
 
     /// Tests a triangle against all lanes: keeps the nearest hit, of equally near ones the lowest triangle; or retires the lanes that
-    /// it stops.
+    /// it stops. Says whether any limit changed.
     #[inline]
     #[target_feature(enable = "avx512f")]
-    fn meet<const ANY: bool, const OCTANT: u8>(&mut self, slot: &Slot) {
+    fn meet<const ANY: bool, const OCTANT: u8>(&mut self, planes: &Planes, place: usize, triangle: &Corners) -> bool {
         let zero = _mm512_setzero_ps();
-        let (near, far) = self.slab::<OCTANT>(&slot.bounds);
+        let (near, far) = self.slab::<OCTANT>(planes, place);
         let enters = _mm512_max_ps(near, zero);
         let inside = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(enters, _mm512_min_ps(far, self.limit));
         if inside == 0 {
-            return;
+            return false;
         }
-        let [a, b, c] = slot.corners.map(|corner| Vec3x16::splat(corner).sub(self.origin));
+        let [a, b, c] = triangle.corners.map(|corner| Vec3x16::splat(corner).sub(self.origin));
         let (ca, ab, bc) = (c.sub(a), a.sub(b), b.sub(c));
         let u = ca.cross(c.add(a)).dot(self.direction);
         let v = ab.cross(a.add(b)).dot(self.direction);
+        let not_below = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(u, zero) & _mm512_cmp_ps_mask::<_CMP_GE_OQ>(v, zero);
+        let not_above = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(u, zero) & _mm512_cmp_ps_mask::<_CMP_LE_OQ>(v, zero);
+        if inside & (not_below | not_above) == 0 {
+            return false;
+        }
         let w = bc.cross(b.add(c)).dot(self.direction);
-        let not_below = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(u, zero)
-            & _mm512_cmp_ps_mask::<_CMP_GE_OQ>(v, zero)
-            & _mm512_cmp_ps_mask::<_CMP_GE_OQ>(w, zero);
-        let not_above = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(u, zero)
-            & _mm512_cmp_ps_mask::<_CMP_LE_OQ>(v, zero)
-            & _mm512_cmp_ps_mask::<_CMP_LE_OQ>(w, zero);
+        let not_below = not_below & _mm512_cmp_ps_mask::<_CMP_GE_OQ>(w, zero);
+        let not_above = not_above & _mm512_cmp_ps_mask::<_CMP_LE_OQ>(w, zero);
         let inside = inside & (not_below | not_above);
         if inside == 0 {
-            return;
+            return false;
         }
         let normal = ca.cross(ab);
         let facing = normal.dot(self.direction);
@@ -148,12 +147,13 @@ impl Rays {
             & _mm512_cmp_ps_mask::<_CMP_NEQ_OQ>(facing, zero)
             & _mm512_cmp_ps_mask::<_CMP_GT_OQ>(t, zero)
             & _mm512_cmp_ps_mask::<_CMP_LT_OQ>(t, _mm512_set1_ps(f32::INFINITY));
-        let id = _mm512_set1_epi32(slot.id as i32);
+        let id = _mm512_set1_epi32(triangle.id as i32);
         let nearer = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(t, self.limit);
         if ANY {
             let stopped = hit & nearer;
             self.limit = _mm512_mask_mov_ps(self.limit, stopped, _mm512_set1_ps(f32::NEG_INFINITY));
             self.triangle = _mm512_mask_mov_epi32(self.triangle, stopped, id);
+            stopped != 0
         } else {
             // A limit is not a hit: the first hit must lie strictly before it, and then has a triangle.
             let tie = _mm512_cmp_ps_mask::<_CMP_EQ_OQ>(t, self.limit)
@@ -162,7 +162,34 @@ impl Rays {
             let nearer = hit & (nearer | tie);
             self.limit = _mm512_mask_mov_ps(self.limit, nearer, t);
             self.triangle = _mm512_mask_mov_epi32(self.triangle, nearer, id);
+            nearer != 0
         }
+    }
+
+    /// The rays that are not idle; at least one is not.
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn bundle(&self) -> Bundle {
+        let rows = |v: &Vec3x16| [v.x, v.y, v.z];
+        Bundle {
+            origin: rows(&self.origin),
+            direction: rows(&self.direction),
+            reciprocal: rows(&self.reciprocal),
+            live: self.live(),
+        }
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn live(&self) -> u16 {
+        _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.limit, _mm512_set1_ps(f32::NEG_INFINITY))
+    }
+
+    /// The largest limit of all lanes.
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn farthest(&self) -> f32 {
+        _mm512_reduce_max_ps(self.limit)
     }
 }
 
@@ -186,7 +213,7 @@ fn axis<const OCTANT: u8, const AXIS: u8>(low: f32, high: f32, origin: __m512, r
 #[inline]
 #[target_feature(enable = "avx512f,avx512dq")]
 fn octant(rays: &Rays) -> u8 {
-    let live = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(rays.limit, _mm512_set1_ps(f32::NEG_INFINITY));
+    let live = rays.live();
     let mut octant = 0;
     for (axis, r) in [rays.reciprocal.x, rays.reciprocal.y, rays.reciprocal.z].into_iter().enumerate() {
         let negative = _mm512_movepi32_mask(_mm512_castps_si512(r)) & live;
@@ -202,9 +229,7 @@ fn octant(rays: &Rays) -> u8 {
 /// Finds the nearest hits of a packet, or whether anything is hit.
 #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,bmi1,bmi2,lzcnt,popcnt")]
 pub(super) fn trace<const ANY: bool>(accel: &Accel, packet: &mut Packet) {
-    if accel.nodes.is_empty() {
-        return;
-    }
+    let tree = accel.packet_tree();
     let (origin, direction, reciprocal) = packet.rows();
     let mut rays = Rays {
         origin: Vec3x16::load(origin),
@@ -213,16 +238,20 @@ pub(super) fn trace<const ANY: bool>(accel: &Accel, packet: &mut Packet) {
         limit: load(packet.limits()),
         triangle: _mm512_set1_epi32(NOTHING as i32),
     };
+    if tree.nodes.is_empty() || rays.live() == 0 {
+        return;
+    }
+    let pad = accel.pad;
     match octant(&rays) {
-        0 => traverse::<ANY, 0>(accel, &mut rays),
-        1 => traverse::<ANY, 1>(accel, &mut rays),
-        2 => traverse::<ANY, 2>(accel, &mut rays),
-        3 => traverse::<ANY, 3>(accel, &mut rays),
-        4 => traverse::<ANY, 4>(accel, &mut rays),
-        5 => traverse::<ANY, 5>(accel, &mut rays),
-        6 => traverse::<ANY, 6>(accel, &mut rays),
-        7 => traverse::<ANY, 7>(accel, &mut rays),
-        _ => traverse::<ANY, MIXED>(accel, &mut rays),
+        0 => traverse::<ANY, 0>(tree, pad, &mut rays),
+        1 => traverse::<ANY, 1>(tree, pad, &mut rays),
+        2 => traverse::<ANY, 2>(tree, pad, &mut rays),
+        3 => traverse::<ANY, 3>(tree, pad, &mut rays),
+        4 => traverse::<ANY, 4>(tree, pad, &mut rays),
+        5 => traverse::<ANY, 5>(tree, pad, &mut rays),
+        6 => traverse::<ANY, 6>(tree, pad, &mut rays),
+        7 => traverse::<ANY, 7>(tree, pad, &mut rays),
+        _ => traverse::<ANY, MIXED>(tree, pad, &mut rays),
     }
     let (limit, triangle) = packet.results();
     store(limit, rays.limit);
@@ -241,63 +270,67 @@ fn triangles(ids: __m512i) -> [u32; LANES] {
     out
 }
 
+/// Nodes waiting on the way down, on the stack for all but degenerate trees.
+const WAITING: usize = 192;
+
 #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,bmi1,bmi2,lzcnt,popcnt")]
-fn traverse<const ANY: bool, const OCTANT: u8>(accel: &Accel, rays: &mut Rays) {
-    let mut waiting = [0u32; STACK];
+fn traverse<const ANY: bool, const OCTANT: u8>(tree: &PacketTree, pad: f32, rays: &mut Rays) {
+    let mut waiting = [(0u32, 0.0f32); WAITING];
     let mut heap = Vec::new();
-    let waiting: &mut [u32] = if accel.depth <= STACK {
+    let waiting: &mut [(u32, f32)] = if tree.waiting <= WAITING {
         &mut waiting
     } else {
-        heap.resize(accel.depth, 0);
+        heap.resize(tree.waiting, (0, 0.0));
         &mut heap
     };
+    let beam = Beam::around::<OCTANT>(&rays.bundle(), pad);
+    let mut end = beam.end(rays.farthest());
     let mut count = 0;
-    let mut index = 0usize;
+    let mut index = 0u32;
     loop {
-        let node = &accel.nodes[index];
-        let (first, first_near) = rays.meets::<OCTANT>(&node.bounds[0]);
-        let (second, second_near) = rays.meets::<OCTANT>(&node.bounds[1]);
-        let mut inner = [0u32; 2];
-        let mut inners = 0;
-        for (child, mask) in node.children.iter().zip([first, second]) {
-            if mask == 0 {
+        let node = &tree.nodes[index as usize];
+        let (met, near) = beam.meets::<OCTANT>(&node.planes, end);
+        let mut triangles = met & node.triangles;
+        let mut changed = false;
+        while triangles != 0 {
+            let place = triangles.trailing_zeros() as usize;
+            triangles &= triangles - 1;
+            changed |= rays.meet::<ANY, OCTANT>(&node.planes, place, &tree.triangles[node.children[place] as usize]);
+        }
+        if changed {
+            let limit = rays.farthest();
+            if limit == f32::NEG_INFINITY {
+                return;
+            }
+            end = beam.end(limit);
+        }
+        let mut inner = met & node.used & !node.triangles;
+        let first = count;
+        while inner != 0 {
+            let place = inner.trailing_zeros() as usize;
+            inner &= inner - 1;
+            // Camera rays of a pixel are so close together that their beam is as good as they are.
+            if (ANY || OCTANT == MIXED) && rays.meets::<OCTANT>(&node.planes, place) == 0 {
                 continue;
             }
-            match child.split() {
-                Ok(slots) => {
-                    for slot in &accel.slots[slots] {
-                        rays.meet::<ANY, OCTANT>(slot);
-                    }
-                }
-                Err(child) => {
-                    inner[inners] = child as u32;
-                    inners += 1;
-                }
+            // Farthest first, so that the nearest is taken next; the order cannot change the answer.
+            let mut at = count;
+            while at > first && waiting[at - 1].1 < near[place] {
+                waiting[at] = waiting[at - 1];
+                at -= 1;
+            }
+            waiting[at] = (node.children[place], near[place]);
+            count += 1;
+        }
+        loop {
+            if count == 0 {
+                return;
+            }
+            count -= 1;
+            if waiting[count].1 <= end {
+                break;
             }
         }
-        if ANY && _mm512_cmp_ps_mask::<_CMP_GT_OQ>(rays.limit, _mm512_set1_ps(f32::NEG_INFINITY)) == 0 {
-            return;
-        }
-        index = match inners {
-            0 if count == 0 => return,
-            0 => {
-                count -= 1;
-                waiting[count] as usize
-            }
-            1 => inner[0] as usize,
-            _ => {
-                // The one that more rays enter first; the order cannot change the answer.
-                let both = first & second;
-                let sooner = _mm512_mask_cmp_ps_mask::<_CMP_LT_OQ>(both, second_near, first_near);
-                let order = if both == 0 {
-                    usize::from(second.count_ones() > first.count_ones())
-                } else {
-                    usize::from(2 * sooner.count_ones() > both.count_ones())
-                };
-                waiting[count] = inner[1 - order];
-                count += 1;
-                inner[order] as usize
-            }
-        };
+        index = waiting[count].0;
     }
 }

@@ -1,5 +1,7 @@
 //! The tree: built by obvhs, stored as pairs of boxes.
 
+use std::sync::OnceLock;
+
 use glam::Vec3;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -7,7 +9,9 @@ use obvhs::bvh2::leaf_collapser::collapse;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
-use super::{Bounds, Kernel, Triangle, box_padding};
+use super::nodes8::Tree8;
+use super::packet_tree::PacketTree;
+use super::{Bounds, Kernel, Triangle, box_padding, pages};
 
 /// Most triangles in a leaf; a leaf's count is stored in 3 bits.
 const LEAF_TRIANGLES: u32 = 8;
@@ -65,21 +69,28 @@ pub struct Accel {
     /// Levels below the root, which bounds a traversal's stack.
     pub(super) depth: usize,
     pub(super) kernel: Kernel,
+    /// How much wider than its triangle a box is.
+    pub(super) pad: f32,
+    packets: OnceLock<PacketTree>,
+    single: OnceLock<Tree8>,
 }
 
 impl Accel {
     /// Builds the tree over `triangles`, whose indices hits will name.
     ///
     /// `reach` bounds the coordinates of every ray's origin and its distance to everything it meets; it sets how far boxes
-    /// are padded (see [`box_padding`]). Triangles without area are never hit. The build reads no clock and uses no
-    /// threads, so the tree is a function of its arguments.
+    /// are padded (see [`box_padding`]). Triangles without area are never hit. The build reads no clock, and the
+    /// tree is the same on any number of threads.
     pub fn new(triangles: &[Triangle], reach: f32) -> Self {
         let pad = box_padding(reach);
         let mut accel = Self {
             nodes: Vec::new(),
-            slots: Vec::with_capacity(triangles.len()),
+            slots: pages::with_capacity(triangles.len()),
             depth: 0,
             kernel: Kernel::detected(),
+            pad,
+            packets: OnceLock::new(),
+            single: OnceLock::new(),
         };
         if triangles.is_empty() {
             return accel;
@@ -90,6 +101,11 @@ impl Accel {
             Slot { corners: triangle.corners, bounds: triangle.bounds(pad), id: index }
         };
         accel.copy(&tree, &place);
+        drop(tree);
+        #[cfg(target_arch = "x86_64")]
+        if accel.kernel == Kernel::Avx512 {
+            accel.packet_tree();
+        }
         accel
     }
 
@@ -107,9 +123,24 @@ impl Accel {
         self.kernel = kernel;
     }
 
-    /// Bytes that tree and triangles take.
+    /// Bytes that trees and triangles take; those for single rays from when one was asked for.
     pub fn bytes(&self) -> usize {
-        self.nodes.len() * size_of::<Node>() + self.slots.len() * size_of::<Slot>()
+        let packets = self.packets.get().map_or(0, PacketTree::bytes);
+        let single = self.single.get().map_or(0, Tree8::bytes);
+        size_of_val(self.nodes.as_slice()) + size_of_val(self.slots.as_slice()) + packets + single
+    }
+
+    /// The tree for packets in wide registers: made at once where the processor has these, else when it is first asked for.
+    #[cfg(target_arch = "x86_64")]
+    #[inline]
+    pub(super) fn packet_tree(&self) -> &PacketTree {
+        self.packets.get_or_init(|| PacketTree::new(self))
+    }
+
+    /// The tree for single rays: made when first asked for, since pictures are rendered without one.
+    #[inline(always)]
+    pub(super) fn single_rays(&self) -> &Tree8 {
+        self.single.get_or_init(|| Tree8::new(self, self.pad))
     }
 
     /// Copies obvhs' tree, depth first, so that a node's first child follows it.
@@ -126,6 +157,8 @@ impl Accel {
             self.depth = 1;
             return;
         }
+        // Two boxes a node, of all but the root.
+        self.nodes = pages::with_capacity(tree.nodes.len() / 2);
         // (obvhs node, our parent and side, level)
         let mut open = vec![(0usize, None::<(usize, usize)>, 1usize)];
         while let Some((n, parent, level)) = open.pop() {
@@ -179,4 +212,31 @@ fn obvhs_tree(triangles: &[Triangle], pad: f32) -> Bvh2 {
     collapse(&mut tree, LEAF_TRIANGLES, 3.0);
     reinsertion.run(&mut tree, 0.1, None);
     tree
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// More triangles than the builder gives to one thread, many of them alike, so that costs tie.
+    #[test]
+    fn the_tree_is_the_same_on_any_number_of_threads() {
+        let triangles: Vec<Triangle> = (0..12_000u32)
+            .map(|i| {
+                let at = |k: u32| (i.wrapping_mul(2_654_435_761).rotate_left(k) >> 24) as f32;
+                let corner = Vec3::new(at(0), at(9), if i % 3 == 0 { 5.0 } else { at(17) });
+                Triangle { corners: [corner, corner + Vec3::X, corner + Vec3::Y] }
+            })
+            .collect();
+        let tree = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            pool.install(|| Accel::new(&triangles, 600.0))
+        };
+        let one = tree(1);
+        for other in [2, 3, 7].map(tree) {
+            assert_eq!((other.depth, other.nodes.len()), (one.depth, one.nodes.len()));
+            assert!(other.nodes.iter().zip(&one.nodes).all(|(a, b)| a.bounds == b.bounds && a.children == b.children));
+            assert!(other.slots.iter().map(|slot| slot.id).eq(one.slots.iter().map(|slot| slot.id)));
+        }
+    }
 }

@@ -10,8 +10,21 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+#[cfg(target_arch = "x86_64")]
+mod beam;
 mod build;
+mod nodes8;
 mod packet;
+mod packet_tree;
+mod pages;
+mod single;
+#[cfg(target_arch = "x86_64")]
+mod single_avx2;
+#[cfg(target_arch = "x86_64")]
+mod single_avx512;
+mod stack;
+#[cfg(target_arch = "x86_64")]
+mod vector8;
 mod wide;
 
 use glam::Vec3;

@@ -291,22 +291,6 @@ impl Accel {
             };
         }
     }
-
-    /// The nearest hit of one ray below `limit`: a packet of one.
-    pub fn closest_one(&self, ray: &Ray, limit: f32) -> Option<Hit> {
-        let mut packet = Packet::default();
-        packet.set(0, ray, limit);
-        self.closest(&mut packet);
-        packet.hit(0)
-    }
-
-    /// Whether one ray meets anything below `limit`: a packet of one.
-    pub fn occluded_one(&self, ray: &Ray, limit: f32) -> bool {
-        let mut packet = Packet::default();
-        packet.set(0, ray, limit);
-        self.occluded(&mut packet);
-        packet.is_occluded(0)
-    }
 }
 
 #[cfg(test)]

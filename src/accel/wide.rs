@@ -39,6 +39,7 @@ impl Kernel {
                     && is_x86_feature_detected!("bmi2")
                     && is_x86_feature_detected!("lzcnt")
                     && is_x86_feature_detected!("popcnt")
+                    && is_x86_feature_detected!("fma")
                     && is_x86_feature_detected!("avx2");
                 let wide = is_x86_feature_detected!("avx512f")
                     && is_x86_feature_detected!("avx512vl")
@@ -57,6 +58,21 @@ impl Kernel {
             Self::Scalar => "scalar",
             Self::Avx2 => "avx2",
             Self::Avx512 => "avx512",
+        }
+    }
+
+    /// The kernel of that name.
+    ///
+    /// # Errors
+    /// What was expected and found, where there is none or this processor cannot run it.
+    pub fn parse(name: &str) -> Result<Self, String> {
+        let list = |kernels: &[Self]| kernels.iter().map(|kernel| kernel.name()).collect::<Vec<_>>().join(", ");
+        match Self::ALL.into_iter().find(|kernel| kernel.name() == name) {
+            None => Err(format!("expected one of {}, found \"{name}\"", list(&Self::ALL))),
+            Some(kernel) if !kernel.is_available() => {
+                Err(format!("expected what this processor can run: {}, found \"{name}\"", list(&Self::available())))
+            }
+            Some(kernel) => Ok(kernel),
         }
     }
 

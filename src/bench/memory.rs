@@ -8,6 +8,7 @@ use super::timing::{Case, Part, Repeat};
 use crate::error::Error;
 use crate::render::render;
 use crate::sampling::{Preset, Sampler, SamplerSpec};
+use crate::scene::compile::Scene;
 
 const MIB: f64 = 1_048_576.0;
 
@@ -17,7 +18,7 @@ pub fn cases(lab: &Rc<Lab>) -> Vec<Case> {
     let prepare = move || {
         let repeat: Repeat = Box::new(move || {
             let scene = lab.landscape(1).borrow();
-            let stated = (scene.bytes() as f64 + 24.0 * f64::from(SIZE.0) * f64::from(SIZE.1)) / MIB;
+            let stated = Scene::most_bytes(&scene.mesh, u64::from(SIZE.0) * u64::from(SIZE.1)) as f64 / MIB;
             let spec = SamplerSpec::parse("sobol", Preset::Best)?;
             let sampler = Sampler::new(spec, &scene.layout, 1, 1)?;
             render(&scene, &sampler).map_err(|bad| Error::incomplete(Landscape::LARGE.name, bad))?;

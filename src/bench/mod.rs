@@ -17,6 +17,7 @@ mod work;
 
 pub use cases::{GROUPS, names, select};
 pub use lab::{Lab, write_cornell};
+pub use rays::{Batches, KINDS, Kind, Query, all_kinds};
 pub use summary::{Found, median_interval, table};
 pub use timing::{Case, Part, run};
 

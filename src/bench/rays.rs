@@ -35,7 +35,8 @@ pub enum Kind {
     Shadow,
 }
 
-const KINDS: [(Kind, &str); 3] =
+/// All kinds with their names.
+pub const KINDS: [(Kind, &str); 3] =
     [(Kind::Primary, "primary-closest"), (Kind::Diffuse, "cosine-closest"), (Kind::Shadow, "shadow-any")];
 
 /// How rays are asked for.
@@ -85,6 +86,7 @@ pub struct Batches {
     pub count: usize,
 }
 
+#[derive(Clone)]
 struct Batch {
     origin: [Row; 3],
     direction: [Row; 3],
@@ -116,6 +118,19 @@ impl Batches {
     pub fn trace(&self, accel: &Accel, kind: Kind, query: Query) -> usize {
         let chunk = |batches: &[Batch]| accel.kernel().run(Trace { accel, batches, kind, query });
         self.packets.par_chunks(CHUNK).map(chunk).sum()
+    }
+
+    /// In order, cut into at most `count` ≥ 1 parts of about the same length.
+    pub fn parts(self, count: usize) -> Vec<Self> {
+        let length = self.packets.len().div_ceil(count).max(1);
+        let part =
+            |packets: &[Batch]| Self { count: packets.iter().map(|batch| batch.used).sum(), packets: packets.to_vec() };
+        self.packets.chunks(length).map(part).collect()
+    }
+
+    /// The packets: origins, directions, limits by lane (−∞ where there is no ray).
+    pub fn packets(&self) -> impl Iterator<Item = (&[Row; 3], &[Row; 3], &Row)> {
+        self.packets.iter().map(|batch| (&batch.origin, &batch.direction, &batch.limit))
     }
 }
 
@@ -161,8 +176,11 @@ impl Wide for Trace<'_> {
     }
 }
 
-/// The rays of all kinds, in the order of [`KINDS`].
-fn all_kinds(scene: &Scene) -> [Batches; 3] {
+/// The rays of all kinds, in the order of [`KINDS`]: of one pixel of 64, 16 samples each.
+///
+/// # Panics
+/// For a scene that is no landscape.
+pub fn all_kinds(scene: &Scene) -> [Batches; 3] {
     let primary = primary_rays(scene);
     let points: Vec<SurfacePoint> = primary
         .iter()

@@ -174,9 +174,9 @@ impl Check {
         let estimator = estimator.transpose()?;
         let size =
             options.size.as_deref().map(|s| Size::parse(s).map_err(|e| Error::input("--size", e))).transpose()?;
+        self.work.start_threads()?;
         let mut loaded = options.files.open(file)?;
         loaded.config.estimator = estimator.unwrap_or(loaded.config.estimator);
-        self.work.start_threads()?;
         self.work.warn(&loaded.warnings);
         let question = Question::new(loaded, set, options.spp, size)?;
         self.work.warn(&question.scene().warnings);

@@ -151,6 +151,7 @@ fn survey_json(survey: &Survey) -> serde_json::Value {
         "samples": survey.samples,
         "samples_left": survey.samples_left,
         "samples_growth_at_most": survey.samples_growth,
+        "samples_timed_again": survey.samples_timing,
         "samples_per_second": survey.rate,
         "rate_is_measured": survey.is_rate_measured,
         "seconds_left": survey.seconds_left,

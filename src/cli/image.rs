@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use sampler_lab::accel::Kernel;
 use sampler_lab::error::{Error, Result};
 use sampler_lab::experiment::backend::Size;
 use sampler_lab::film::{check_writable, write_exr, write_png};
@@ -41,6 +42,9 @@ pub struct Render {
     /// Stage of the sheet's Figure 1: start, aa, dof, final
     #[arg(long, default_value = "final")]
     stage: String,
+    /// Instructions that trace the rays: scalar, avx2, avx512; all give the same image [default: the widest here]
+    #[arg(long, value_name = "NAME")]
+    kernel: Option<String>,
     /// Seed of the randomisation [default: the scene's, else 1]
     #[arg(long)]
     seed: Option<u64>,
@@ -73,6 +77,8 @@ impl Render {
             })
             .transpose()?;
         let size = self.size.as_deref().map(|s| Size::parse(s).map_err(|e| Error::input("--size", e))).transpose()?;
+        let kernel =
+            self.kernel.as_deref().map(|k| Kernel::parse(k).map_err(|e| Error::input("--kernel", e))).transpose()?;
         let out = self
             .out
             .clone()
@@ -86,8 +92,19 @@ impl Render {
         let framebuffer = loaded.config.framebuffer;
         loaded.config.estimator = estimator.unwrap_or(loaded.config.estimator);
         let size = size.unwrap_or(Size { width: framebuffer.res_w, height: framebuffer.res_h });
+        let stated = Scene::most_bytes(&loaded.mesh, size.pixels());
+        check_memory(stated)?;
+        if !self.work.quiet {
+            let triangles = loaded.mesh.len();
+            say(format_args!(
+                "{}: {triangles} triangles; at most about {} MB",
+                self.scene.display(),
+                stated / 1_000_000 + 1
+            ));
+        }
         let started = Instant::now();
-        let scene = Scene::new(&loaded.config, loaded.mesh, (size.width, size.height), stage)?;
+        let mut scene = Scene::new(&loaded.config, loaded.mesh, (size.width, size.height), stage)?;
+        scene.accel.set_kernel(kernel.unwrap_or(Kernel::detected()));
         let build_seconds = started.elapsed().as_secs_f64();
         self.work.warn(&loaded.warnings);
         self.work.warn(&scene.warnings);
@@ -98,16 +115,14 @@ impl Render {
         let sampler = Sampler::new(set, &scene.layout, asked, seed)?;
         let samples = size.pixels() * u64::from(sampler.samples());
         if !self.work.quiet {
-            let bytes = scene.bytes() as u64 + 24 * size.pixels();
             say(format_args!(
-                "{} at {size}, {} samples a pixel of {}; about {} MB",
+                "{} at {size}, {} samples a pixel of {}",
                 self.scene.display(),
                 sampler.samples(),
                 match set.single() {
                     Some(spec) => format!("{named} = {}", spec.expansion()),
                     None => set.expansion(),
-                },
-                bytes / 1_000_000 + 1
+                }
             ));
             say(format_args!("{}: {}", stage.name(), scene.layout));
         }
@@ -160,12 +175,14 @@ impl Render {
                 "spp": {"asked": asked, "taken": sampler.samples()},
                 "size": size.to_string(),
                 "seed": seed,
+                "kernel": scene.accel.kernel().name(),
                 "focal_depth": scene.focal_depth(),
                 "render_seconds": render_seconds,
                 "load_seconds": load_seconds,
                 "build_seconds": build_seconds,
                 "samples_per_second": per_second(samples),
                 "rays_per_second": per_second(rendered.rays),
+                "stated_bytes": stated,
                 "peak_bytes": peak_bytes(),
             }))?;
         }
@@ -200,9 +217,30 @@ fn bar(samples: u64, quiet: bool) -> ProgressBar {
     bar.with_style(style.expect("the template is well formed"))
 }
 
+/// Refuses work that needs more memory than is free: else the system would end the process in the middle of it.
+///
+/// # Errors
+/// Kind `Input` with both numbers, where the system tells what is free.
+fn check_memory(needed: u64) -> Result<()> {
+    let Some(free) = free_bytes().filter(|free| *free < needed) else { return Ok(()) };
+    let [needed, free] = [needed, free].map(|bytes| bytes / 1_000_000);
+    let what = format!("expected a scene and an image that fit, found about {needed} MB needed and {free} MB free");
+    Err(Error::input("memory", what))
+}
+
+/// Memory that new work can have, where the system tells it.
+fn free_bytes() -> Option<u64> {
+    kilobytes_of("/proc/meminfo", "MemAvailable:")
+}
+
 /// Largest resident size of this process so far, where the system tells it.
 fn peak_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    kilobytes_of("/proc/self/status", "VmHWM:")
+}
+
+/// The bytes in the line of a system's file that begins with `name`.
+fn kilobytes_of(file: &str, name: &str) -> Option<u64> {
+    let text = std::fs::read_to_string(file).ok()?;
+    let line = text.lines().find(|line| line.starts_with(name))?;
     Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
 }

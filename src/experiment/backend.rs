@@ -273,6 +273,16 @@ pub trait Backend {
     /// stopped.
     fn render(&self, request: &RenderRequest) -> Result<Image>;
 
+    /// Draws the random numbers that [`render`](Self::render) would read for this image, and nothing else; whether it can.
+    /// Its seconds against those of the image are the share of sampling.
+    ///
+    /// # Errors
+    /// As [`prepare`](Self::prepare).
+    fn draw_numbers(&self, request: &RenderRequest) -> Result<bool> {
+        let _ = request;
+        Ok(false)
+    }
+
     /// Distance of the plane of focus in an image of this size, scene units; `None` for a pinhole. With auto focus it
     /// depends on the image's shape.
     fn focal_depth(&self, scene: &str, size: Size) -> Option<f64>;

@@ -6,6 +6,9 @@
 
 mod grow;
 mod halves;
+mod options;
+mod rounds;
+mod rows;
 
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
@@ -13,7 +16,7 @@ use std::io::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use super::backend::{Backend, RenderRequest, Size};
@@ -23,122 +26,17 @@ use super::images::Images;
 use super::lines::{line, write_lines};
 use super::machine;
 use super::measure::{self, ReferenceImages};
-use super::origin::Origin;
-use super::pixels;
-use super::plan::{EnsembleWork, ImageWork, Plan, PointsWork, ReferenceSource, ReferenceWork, Work, WorkItem};
+use super::plan::{Plan, Work, WorkItem};
 use super::prediction;
 use super::progress::{Meter, Progress};
-use super::results::{
-    self, EnsembleRow, ImageErrors, ImageRow, Kind, PointsRow, ReferenceRow, Row, SCHEMA, Source, Timing, read_image,
-};
-use super::shards::Shard;
+use super::results::{self, Row, Timing, read_image};
 use super::status::stale_rows;
 use super::superseded::{self, Settled};
-use super::survey::{self, Limits, Standing, State, Survey};
+use super::survey::{self, Standing, State, Survey};
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::{Image, write_exr};
-use crate::stats::t_interval;
 use grow::Growing;
-
-/// How to run.
-pub struct Options<'a> {
-    /// Threads that work inside an image, at least 1.
-    pub threads: usize,
-    /// Forget what the folder holds and do everything again.
-    pub fresh: bool,
-    /// The command that makes this folder, for provenance; the same for every run of the same experiment.
-    pub command: String,
-    /// Where the experiment was read from.
-    pub source: Option<Source>,
-    /// The way to it on this machine, where it is to be written down.
-    pub origin: Option<Origin>,
-    /// Do this part of the plan alone.
-    pub shard: Option<Shard>,
-    /// What the run may use.
-    pub limits: Limits,
-    /// End after so many items, as a kill would.
-    pub at_most: Option<usize>,
-    /// Set from elsewhere: end soon. An image at hand is given up at its next tile, anything else is ended first.
-    pub stop: Option<&'a AtomicBool>,
-}
-
-impl Options<'_> {
-    /// Options of a plain run.
-    pub fn new(threads: usize, command: impl Into<String>) -> Self {
-        let (limits, command) = (Limits::default(), command.into());
-        let threads = threads.max(1);
-        Self {
-            threads,
-            fresh: false,
-            command,
-            source: None,
-            origin: None,
-            shard: None,
-            limits,
-            at_most: None,
-            stop: None,
-        }
-    }
-}
-
-/// An item that could not be done.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Failure {
-    /// The item.
-    pub id: String,
-    /// The item in words.
-    pub label: String,
-    /// Why.
-    pub error: Error,
-}
-
-/// What a run did.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Outcome {
-    /// Items of the plan, or of the part of it that was to be done, without the batches that no reference wants.
-    pub items: usize,
-    /// Items that were done before.
-    pub found: usize,
-    /// Items that this run did.
-    pub done: usize,
-    /// Items that could not be done; the others went on.
-    pub failures: Vec<Failure>,
-    /// Whether the run was told to end early.
-    pub interrupted: bool,
-    /// Samples rendered.
-    pub samples: u64,
-    /// Whether it began with forgetting what was there.
-    pub fresh: bool,
-}
-
-impl Outcome {
-    /// Nothing is missing.
-    ///
-    /// # Errors
-    /// Kind `Incomplete` that counts what is missing and gives the first reason; kind `Interrupted` where the run was told
-    /// to end.
-    pub fn check(&self) -> Result<()> {
-        let missing = self.items - self.found - self.done;
-        if self.interrupted {
-            let done = self.found + self.done;
-            let without = if self.fresh { " without --fresh" } else { "" };
-            let what = format!(
-                "told to end with {done} of {} items done; the same command{without} goes on from there",
-                self.items
-            );
-            return Err(Error::interrupted("run", what));
-        }
-        match self.failures.first() {
-            None if missing == 0 => Ok(()),
-            None => Err(Error::incomplete("run", format!("expected {} items, {missing} are missing", self.items))),
-            Some(Failure { label, error, .. }) => {
-                let what =
-                    format!("expected {} items, {} failed, first {label}: {error}", self.items, self.failures.len());
-                Err(Error::incomplete("run", what))
-            }
-        }
-    }
-}
+pub use options::{Failure, Options, Outcome};
 
 /// Does every item of `plan` that `out` lacks.
 ///
@@ -205,6 +103,7 @@ pub fn execute_locked(
     let mut run = Run::new(plan, backend, out, progress, options, standing, meter)?;
     let (done, mut interrupted) = run.all_items(&part)?;
     interrupted |= !interrupted && run.right_wrong_rows()?;
+    interrupted |= !interrupted && run.time_again(&part)?;
     if !interrupted {
         run.keep_references()?;
         run.write_in_plan_order()?;
@@ -425,139 +324,6 @@ impl<'a> Run<'a> {
         self.plan.names(sampler).to_vec()
     }
 
-    fn image_row(&mut self, item: &WorkItem, work: &ImageWork) -> Result<ImageRow> {
-        let image = self.image(&item.id)?;
-        let errors: Option<ImageErrors> = match &work.reference_id {
-            None => None,
-            Some(id) => {
-                let (reference, exposure) = (self.reference(id)?, self.plan.exposure(&work.scene));
-                Some(measure::errors(&image, &reference, id, item.metrics_algorithm, exposure))
-            }
-        };
-        let twin = match &work.twin {
-            None => None,
-            Some(id) => Some(measure::difference(&image, &*self.image(id)?, id)),
-        };
-        Ok(ImageRow {
-            schema: SCHEMA,
-            id: item.id.clone(),
-            kind: work.kind,
-            scene: work.scene.clone(),
-            sampler: work.sampler.clone(),
-            names: self.names(&work.sampler),
-            spp: work.spp,
-            replicate: work.replicate,
-            batch: work.batch.as_ref().map_or(0, |batch| batch.number),
-            seed: work.seed,
-            estimator: work.estimator,
-            stage: work.stage,
-            variant: work.variant,
-            size: work.size,
-            mean: measure::mean_value(&image.pixels),
-            pixels: pixel_hash(&image.pixels),
-            twin,
-            made_with: None,
-            errors,
-        })
-    }
-
-    fn reference_row(&mut self, item: &WorkItem, work: &ReferenceWork) -> Result<ReferenceRow> {
-        let (reference, noise_mse, growth) = match self.plan.growth(&item.id) {
-            Some(_) => {
-                let grown = self.grown(&item.id)?;
-                (grown.images, grown.noise_mse, Some(grown.growth))
-            }
-            None => {
-                let reference = self.reference(&item.id)?;
-                (reference.clone(), reference.noise_mse(), None)
-            }
-        };
-        let (sampler, spp, halves) = match &work.source {
-            ReferenceSource::Exact => ("exact".to_owned(), None, None),
-            ReferenceSource::Halves { ids, sampler, spp, .. } => (sampler.clone(), Some(*spp), Some(ids.clone())),
-        };
-        Ok(ReferenceRow {
-            schema: SCHEMA,
-            id: item.id.clone(),
-            kind: Kind::Reference,
-            scene: work.scene.clone(),
-            sampler,
-            spp,
-            size: work.size,
-            focal_depth: self.backend.focal_depth(&work.scene, work.size),
-            halves,
-            growth,
-            metrics_algorithm: item.metrics_algorithm,
-            noise_mse,
-            mean: reference.mean_value(),
-            pixels: reference.pixels(),
-            made_with: None,
-        })
-    }
-
-    fn ensemble_row(&mut self, item: &WorkItem, work: &EnsembleWork) -> Result<EnsembleRow> {
-        let members: Vec<Arc<Image>> = work.members.iter().map(|id| self.image(id)).collect::<Result<_>>()?;
-        let reference = self.reference(&work.reference_id)?;
-        let (e, error_autocorrelation) = measure::ensemble(&members, &reference);
-        let exposure = self.plan.exposure(&work.scene);
-        // What a member's row says of the same comparison need not be looked at twice.
-        let known = |id: &String| match self.rows.get(id) {
-            Some(Row::Image(row)) => {
-                row.errors
-                    .as_ref()
-                    .filter(|e| e.reference_id == work.reference_id && e.metrics_algorithm == item.metrics_algorithm)?
-                    .flip
-            }
-            _ => None,
-        };
-        let flip =
-            |(id, image): (&String, &Arc<Image>)| known(id).unwrap_or_else(|| reference.flip(image, exposure).mean);
-        let flips: Vec<f64> = work.members.iter().zip(&members).map(flip).collect();
-        Ok(EnsembleRow {
-            schema: SCHEMA,
-            id: item.id.clone(),
-            kind: Kind::Ensemble,
-            scene: work.scene.clone(),
-            sampler: work.sampler.clone(),
-            names: self.names(&work.sampler),
-            spp: work.spp,
-            estimator: work.estimator,
-            variant: work.variant,
-            size: work.size,
-            reference_id: work.reference_id.clone(),
-            metrics_algorithm: item.metrics_algorithm,
-            replicates: members.len() as u32,
-            mse: e.mse,
-            rmse: e.rmse,
-            rel_mse: e.rel_mse,
-            bias2: e.bias2,
-            variance: e.variance,
-            bias: e.bias,
-            error_autocorrelation,
-            flip: Some(t_interval(&flips, 0.95).with_rounded_interval()),
-            error_spectrum: work.variant.is_plain().then(|| Box::new(pixels::spectrum(&members, &reference))),
-            members: work.members.clone(),
-            made_with: None,
-        })
-    }
-
-    fn points_row(&mut self, item: &WorkItem, work: &PointsWork) -> Result<PointsRow> {
-        let metrics = self.backend.point_metrics(&work.sampler, work.n.asked, work.seed, &work.metrics)?;
-        Ok(PointsRow {
-            schema: SCHEMA,
-            id: item.id.clone(),
-            kind: Kind::Points,
-            sampler: work.sampler.clone(),
-            names: self.names(&work.sampler),
-            n: work.n,
-            replicate: work.replicate,
-            seed: work.seed,
-            metrics_algorithm: item.metrics_algorithm,
-            metrics,
-            made_with: None,
-        })
-    }
-
     /// The images of a reference.
     fn reference(&mut self, id: &str) -> Result<Arc<ReferenceImages>> {
         if let Some((held, images)) = &self.reference
@@ -641,13 +407,13 @@ impl<'a> Run<'a> {
         let (samples, threads) = (item.samples(), self.options.threads);
         if !self.timings.contains_key(&item.id) {
             let (id, host) = (item.id.clone(), self.host.clone());
-            let timing = Timing { id, seconds, samples, host, threads, load };
+            let timing = Timing { id, seconds, samples, host, threads, load, again: None };
             self.timings_log.append(line(&timing))?;
             self.timings.insert(item.id.clone(), timing);
         }
         self.meter.add_samples(samples);
         let provenance = self.provenance(item);
-        self.images.save(&item.id, image, &provenance)
+        self.images.save(&item.id, image, &provenance, item.is_shown)
     }
 
     /// What to ask the backend for, where the image is rendered.

@@ -126,7 +126,7 @@ pub fn refuse_to_forget(out: &Path) -> Result<()> {
 /// # Errors
 /// Kind `Write` where something cannot be removed.
 pub fn remove_report(out: &Path) -> Result<()> {
-    let names = ["report.md", "summary.csv", "slopes.csv", "stability.csv"];
+    let names = ["report.md", "report.html", "summary.csv", "slopes.csv", "stability.csv"];
     remove(names.iter().map(|name| out.join(name)))
 }
 

@@ -8,7 +8,7 @@ use super::backend::Size;
 use super::identity::pixel_hash;
 use super::results::{image_path, read_image};
 use crate::error::Result;
-use crate::film::{Image, write_exr};
+use crate::film::{Image, write_exr, write_exr_plain};
 
 /// Images by the id of their item.
 pub struct Images {
@@ -34,15 +34,22 @@ impl Images {
         Some(image)
     }
 
-    /// Writes an image and holds it.
+    /// Writes an image, compressed where it is one to look at, and holds it.
     ///
     /// # Errors
     /// Kind `Write`.
-    pub fn save(&mut self, id: &str, image: Image, provenance: &[(String, String)]) -> Result<Arc<Image>> {
+    pub fn save(
+        &mut self,
+        id: &str,
+        image: Image,
+        provenance: &[(String, String)],
+        is_shown: bool,
+    ) -> Result<Arc<Image>> {
         let mut provenance = provenance.to_vec();
         provenance.push(("id".to_owned(), id.to_owned()));
         provenance.push(("pixels".to_owned(), pixel_hash(&image.pixels)));
-        write_exr(&image_path(&self.out, id), &image, &provenance)?;
+        let write = if is_shown { write_exr } else { write_exr_plain };
+        write(&image_path(&self.out, id), &image, &provenance)?;
         let image = Arc::new(image);
         self.memory.insert(id.to_owned(), image.clone());
         Ok(image)
@@ -72,7 +79,7 @@ mod tests {
         let (size, other) = (Size { width: 3, height: 2 }, Size { width: 2, height: 3 });
         let mut images = Images::new(folder.path());
         let image = Image { width: 3, height: 2, pixels: vec![[0.5, -0.0, 7.0]; 6] };
-        images.save("a", image.clone(), &[("seed".to_owned(), "1".to_owned())]).unwrap();
+        images.save("a", image.clone(), &[("seed".to_owned(), "1".to_owned())], false).unwrap();
         let hash = pixel_hash(&image.pixels);
         assert_eq!(stored(folder.path(), "a", size, None), Some(image.clone()));
         assert_eq!(stored(folder.path(), "a", size, Some(&hash)), Some(image.clone()));
@@ -91,20 +98,23 @@ mod tests {
     fn every_torn_or_flipped_image_is_noticed() {
         let folder = tempfile::tempdir().unwrap();
         let size = Size { width: 4, height: 4 };
-        let pixels = (0..16).map(|i| [i as f32, 0.1 * i as f32, 1.0 / (1.0 + i as f32)]).collect();
-        Images::new(folder.path()).save("a", Image { width: 4, height: 4, pixels }, &[]).unwrap();
-        let path = image_path(folder.path(), "a");
-        let good = std::fs::read(&path).unwrap();
-        let image = stored(folder.path(), "a", size, None).unwrap();
-        for at in 0..good.len() {
-            std::fs::write(&path, &good[..at]).unwrap();
-            assert_eq!(stored(folder.path(), "a", size, None), None, "cut at {at}");
-            let mut flipped = good.clone();
-            flipped[at] ^= 0x10;
-            std::fs::write(&path, &flipped).unwrap();
-            // A flip in what no reader looks at leaves the pixels as they were; no flip may change them unnoticed.
-            let read = stored(folder.path(), "a", size, None);
-            assert!(read.is_none_or(|read| read == image), "flipped at {at}");
+        let pixels: Vec<[f32; 3]> = (0..16).map(|i| [i as f32, 0.1 * i as f32, 1.0 / (1.0 + i as f32)]).collect();
+        for is_shown in [true, false] {
+            let image = Image { width: 4, height: 4, pixels: pixels.clone() };
+            Images::new(folder.path()).save("a", image, &[], is_shown).unwrap();
+            let path = image_path(folder.path(), "a");
+            let good = std::fs::read(&path).unwrap();
+            let image = stored(folder.path(), "a", size, None).unwrap();
+            for at in 0..good.len() {
+                std::fs::write(&path, &good[..at]).unwrap();
+                assert_eq!(stored(folder.path(), "a", size, None), None, "cut at {at}");
+                let mut flipped = good.clone();
+                flipped[at] ^= 0x10;
+                std::fs::write(&path, &flipped).unwrap();
+                // A flip in what no reader looks at leaves the pixels as they were; no flip may change them unnoticed.
+                let read = stored(folder.path(), "a", size, None);
+                assert!(read.is_none_or(|read| read == image), "flipped at {at}");
+            }
         }
     }
 }

@@ -323,6 +323,21 @@ impl Backend for Lab {
         })
     }
 
+    fn draw_numbers(&self, request: &RenderRequest) -> Result<bool> {
+        self.prepare(request)?;
+        let pool = self.pool(request.threads)?;
+        let set = set(request.sampler)?;
+        self.with(request.scene, |opened| {
+            let scene = &opened.compiled[&Compiled::new(request.stage, request.variant)];
+            for (number, asked) in (0..).zip(request.variant.passes(request.spp)) {
+                let seed = if number == 0 { request.seed } else { derive(request.seed, &[number]) };
+                let sampler = Sampler::new(set, &scene.layout, asked, seed)?;
+                pool.install(|| render::draw_numbers(scene, &sampler));
+            }
+            Ok(true)
+        })
+    }
+
     fn focal_depth(&self, scene: &str, size: Size) -> Option<f64> {
         let mut scenes = self.scenes.borrow_mut();
         let full = scenes.get_mut(scene)?.compiled.get_mut(&Compiled::full())?;

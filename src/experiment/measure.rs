@@ -85,7 +85,13 @@ pub fn errors(
     metrics_algorithm: u32,
     exposure: f32,
 ) -> ImageErrors {
-    let flip = reference.flip(image, exposure);
+    let (flip, errors) =
+        rayon::join(|| reference.flip(image, exposure), || sums(image, reference, reference_id, metrics_algorithm));
+    ImageErrors { flip: Some(flip.mean), flip_weighted_median: Some(flip.weighted_median), ..errors }
+}
+
+/// All but FLIP.
+fn sums(image: &Image, reference: &ReferenceImages, reference_id: &str, metrics_algorithm: u32) -> ImageErrors {
     let t = image.pixels.as_flattened();
     let r = reference.mean.as_flattened();
     let [r1, r2] = reference.flat();
@@ -98,8 +104,8 @@ pub fn errors(
         mae: image_error::mae(t, r),
         bias: image_error::bias(t, r),
         error_autocorrelation: autocorrelation(image, reference),
-        flip: Some(flip.mean),
-        flip_weighted_median: Some(flip.weighted_median),
+        flip: None,
+        flip_weighted_median: None,
     }
 }
 
@@ -124,9 +130,10 @@ pub fn difference(image: &Image, twin: &Image, twin_id: &str) -> TwinDifference 
 pub fn ensemble(replicates: &[Arc<Image>], reference: &ReferenceImages) -> (Ensemble, Option<Estimate>) {
     let images: Vec<&[[f32; 3]]> = replicates.iter().map(|image| image.pixels.as_slice()).collect();
     let [r1, r2] = &reference.halves;
-    let e = image_error::ensemble(&images, &r1.pixels, &r2.pixels);
     // A mean over some replicates only would be another quantity: one that is not defined leaves none.
-    let correlations: Option<Vec<f64>> = replicates.iter().map(|image| autocorrelation(image, reference)).collect();
+    let correlations = || replicates.iter().map(|image| autocorrelation(image, reference)).collect();
+    let (e, correlations): (_, Option<Vec<f64>>) =
+        rayon::join(|| image_error::ensemble(&images, &r1.pixels, &r2.pixels), correlations);
     let rounded = Ensemble {
         mse: e.mse.with_rounded_interval(),
         rmse: e.rmse.map(Estimate::with_rounded_interval),

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::measure::ReferenceImages;
 use crate::film::{Image, screen_light};
 use crate::stats::error_spectrum::{ErrorSpectrum, Power, error_spectrum};
@@ -17,5 +19,5 @@ pub fn see(pixels: &[[f32; 3]], width: u32, exposure: f32) -> Seen {
 pub fn spectrum(replicates: &[Arc<Image>], reference: &ReferenceImages) -> ErrorSpectrum {
     let [r1, r2] = reference.halves();
     let power = |image: &Arc<Image>| Power::of(&image.pixels, &r1.pixels, &r2.pixels, image.width as usize);
-    error_spectrum(&replicates.iter().map(power).collect::<Vec<_>>())
+    error_spectrum(&replicates.par_iter().map(power).collect::<Vec<_>>())
 }

@@ -15,6 +15,9 @@ use super::backend::{estimator_word, stage_word};
 pub use super::growth::{Growth, is_enough};
 use super::identity::{ID_LENGTH, pixel_hash};
 use super::lines::{line, lines, sound_lines};
+pub use super::peers::{PeerPoint, Peers};
+pub(super) use super::timing::parse_timing;
+pub use super::timing::{Rounds, Timing};
 use crate::error::{Error, Result};
 use crate::film::{Image, read_exr};
 pub use crate::stats::ErrorSpectrum;
@@ -546,23 +549,6 @@ impl Row {
     }
 }
 
-/// One line of `timings.jsonl`: the only place with values from a clock.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Timing {
-    /// The item.
-    pub id: String,
-    /// Wall seconds of rendering, without loading the scene or writing the image.
-    pub seconds: f64,
-    /// Samples rendered: spp taken × pixels.
-    pub samples: u64,
-    /// The machine, in words.
-    pub host: String,
-    /// Threads that worked.
-    pub threads: usize,
-    /// Load average of the last minute when the item began; null where the system tells none.
-    pub load: Option<f64>,
-}
-
 /// Reads `results.jsonl`: all whole rows, in the order of the file.
 ///
 /// # Errors
@@ -577,11 +563,6 @@ pub fn read(path: &Path) -> Result<Vec<Row>> {
 /// As [`read`].
 pub fn read_timings(path: &Path) -> Result<Vec<Timing>> {
     Ok(sound_lines(path, parse_timing)?.values)
-}
-
-/// One line of `timings.jsonl`.
-pub(super) fn parse_timing(line: &str) -> std::result::Result<Timing, String> {
-    serde_json::from_str(line).map_err(|e| format!("expected a timing, found: {e}"))
 }
 
 fn is_zero(n: &u32) -> bool {

@@ -18,6 +18,8 @@
 //! | `pictures` | optional: `{"scene", "size", "spp", "reference_spp"}`, or a list of these: images to look at; `spp` is a count or a ladder of counts, `reference_spp` defaults to the reference's |
 //! | `stability` | optional: `{"spp", "scenes", "samplers"}`: a sample more or less, the spread of replicates, other units of length, two passes, all against `spp` samples per pixel; `scenes` and `samplers` default to all of the experiment |
 //! | `prediction` | optional: `{"scene", "samplers", "spp", "pixels", "seeds"}`: the variance of single pixels, predicted from spectra and measured over `seeds` randomisations, in a scene whose only decision is that of the pixel; `pixels` are `[column, row]` |
+//! | `timing` | optional: `{"rounds", "spp", "rmse"}`: after all else make one image of each scene, sampler and count again in so many rounds, for their seconds alone ([`timing`](super::timing)); `spp` defaults to all; `rmse` is `{"SCENE": [RMSE, …]}`, what the report says the time to reach of (default: what uniform sampling reaches at its counts) |
+//! | `peers` | optional: a file of other programs' points ([`peers`](super::peers)), a path from this file's folder |
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
@@ -27,10 +29,13 @@ use serde::{Deserialize, Serialize};
 use super::backend::{Estimator, Size, Variant};
 pub use super::entry::SamplerEntry;
 use super::entry::sampler;
+use super::peers::Peers;
 pub use super::pictures::Pictures;
 use super::pictures::{one_or_more, pictures};
 pub use super::prediction::Prediction;
 use super::prediction::prediction;
+pub use super::timing::TimedRounds;
+use super::timing::timed_rounds;
 use crate::error::{Error, Result};
 use crate::scene::json::{self, Item, Value, suggestion};
 
@@ -81,6 +86,12 @@ pub struct Experiment {
     /// Which variances of single pixels to predict and to measure.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prediction: Option<Prediction>,
+    /// How images are timed again after all of them are done.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub timing: Option<TimedRounds>,
+    /// What other programs need for the same scenes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub peers: Option<Peers>,
     /// The file, for messages; no part of the experiment.
     #[serde(skip)]
     pub place: String,
@@ -216,7 +227,7 @@ impl Experiment {
         Self::from_value(&json::read_file(path)?, &path.display().to_string())
     }
 
-    /// Reads an experiment from JSON; `place` names it in messages.
+    /// Reads an experiment from JSON; `place`, its path, names it in messages and is where `peers` is looked for from.
     ///
     /// # Errors
     /// As [`read`](Self::read).
@@ -236,6 +247,11 @@ impl Experiment {
         let pictures = fields.or("pictures", Vec::new(), |item| pictures(&item, &scenes, reference.spp))?;
         let stability = fields.opt("stability", |item| stability(&item, &scenes, &samplers))?;
         let prediction = fields.opt("prediction", |item| prediction(&item, &scenes))?;
+        let timing = fields.opt("timing", |item| timed_rounds(&item, &scenes, &spp))?;
+        let peers = fields.opt("peers", |item| match item.text("a path")? {
+            "" => Err(item.unexpected("a path of a file with other programs' points")),
+            file => Peers::read(Path::new(place).parent().unwrap_or(Path::new("")), file),
+        })?;
         fields.finish()?;
         Ok(Self {
             name,
@@ -251,6 +267,8 @@ impl Experiment {
             pictures,
             stability,
             prediction,
+            timing,
+            peers,
             place: place.to_owned(),
         })
     }

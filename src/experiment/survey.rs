@@ -217,6 +217,8 @@ pub struct Survey {
     pub samples_left: u64,
     /// The most samples that references may grow by beyond that.
     pub samples_growth: u64,
+    /// Samples of the rounds in which images are timed again, of those left; part of `samples_left`.
+    pub samples_timing: u64,
     /// Samples per second expected with the threads given.
     pub rate: f64,
     /// Whether the rate comes from the folder's own timings.
@@ -242,7 +244,8 @@ impl Survey {
         let is_left = |&position: &usize| !matches!(standing.states[position], State::Done | State::Optional);
         let left: Vec<usize> = part.clone().filter(is_left).collect();
         let samples_growth = samples_growth(plan, standing, out, part.clone());
-        let samples_left = samples_left(plan, standing, out, &left);
+        let samples_timing = samples_timing(plan, standing, part.clone());
+        let samples_left = samples_left(plan, standing, out, &left) + samples_timing;
         let (rate, is_rate_measured) = rate(standing, threads);
         let pairs: u64 = left.iter().map(|&position| plan.items[position].pairs()).sum();
         let kept: Vec<Size> = plan.items.iter().filter_map(WorkItem::kept_image).collect();
@@ -251,6 +254,7 @@ impl Survey {
             samples: wanted(standing, part).map(|position| plan.items[position].samples()).sum(),
             samples_left,
             samples_growth,
+            samples_timing,
             rate,
             is_rate_measured,
             seconds_left: samples_left as f64 / rate + pairs as f64 / PAIR_RATE,
@@ -330,6 +334,16 @@ fn samples_growth(plan: &Plan, standing: &Standing, out: &Path, part: Range<usiz
     let is_open = |batch: &Batch| batches(plan, &standing.rows, &batch.reference_id).is_none();
     let open = plan.items[part].iter().filter(|item| item.batch().is_some_and(is_open));
     open.filter(|item| !is_there(standing, out, &item.id)).map(WorkItem::samples).sum()
+}
+
+/// Samples of the rounds that are still to do.
+fn samples_timing(plan: &Plan, standing: &Standing, part: Range<usize>) -> u64 {
+    let Some(timing) = &plan.experiment.timing else { return 0 };
+    let done = |item: &WorkItem| {
+        standing.timings.get(&item.id).and_then(|t| t.again.as_ref()).map_or(0, |again| again.seconds.len() as u64)
+    };
+    let items = plan.items[part].iter().filter(|item| plan.is_timed_again(item));
+    items.map(|item| u64::from(timing.rounds).saturating_sub(done(item)) * item.samples()).sum()
 }
 
 /// Bytes of the references as images of their own ([`results::reference_path`]).
@@ -428,6 +442,10 @@ impl fmt::Display for Survey {
             self.samples_left as f64 / 1e6
         )?;
         let source = if self.is_rate_measured { "measured here" } else { "stated, nothing timed yet" };
+        if self.samples_timing > 0 {
+            let samples = self.samples_timing as f64 / 1e6;
+            writeln!(f, "timing         {samples:>10.1} M of these in rounds: images made again for their seconds")?;
+        }
         if self.samples_growth > 0 {
             let (samples, seconds) = (self.samples_growth as f64 / 1e6, self.seconds_growth);
             writeln!(f, "growth         {samples:>10.1} M, {seconds:.1} s more at most: references that grow")?;

@@ -96,7 +96,7 @@ impl ScreenTable {
     /// The code value of 8 bits of a radiance; below 0 it is black.
     #[inline]
     pub fn code(&self, radiance: f32) -> u8 {
-        // What is no number is black, as what is below 0.
+        // Written so that what is no number is black.
         if radiance.is_nan() || radiance <= 0.0 {
             return self.codes[0];
         }

@@ -91,7 +91,7 @@ impl Lanes {
 
     /// Reads the spans' numbers, for the decisions that the scene makes.
     #[inline(always)]
-    fn look_up<S: PointSource>(&mut self, scene: &Scene, source: &S, spans: &[Span]) {
+    pub(super) fn look_up<S: PointSource>(&mut self, scene: &Scene, source: &S, spans: &[Span]) {
         let pixel = match &scene.camera.pixel {
             PixelSample::Center => None,
             PixelSample::Sampled(dim) => Some(dim),

@@ -4,10 +4,12 @@
 
 mod direct;
 mod lanes;
+mod numbers;
 mod progressive;
 mod tiles;
 
 pub use direct::light_contribution;
+pub use numbers::draw_numbers;
 pub use progressive::{Growing, Pass};
 pub use tiles::{NonFinite, Rendered, render, render_observed, render_sample, render_while};
 

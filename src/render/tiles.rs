@@ -14,7 +14,7 @@ use crate::scene::compile::Scene;
 use super::lanes::{Lanes, Span};
 
 /// Side of a tile in pixels.
-const TILE: u32 = 8;
+pub(super) const TILE: u32 = 8;
 
 /// A finished image and what it took.
 #[derive(Debug, Clone, PartialEq)]

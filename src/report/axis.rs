@@ -39,6 +39,11 @@ impl LogAxis {
         self.from + (libm::log10(value) - self.low) / (self.high - self.low) * (self.to - self.from)
     }
 
+    /// The value at a pixel.
+    pub fn value(&self, pixel: f64) -> f64 {
+        libm::pow(10.0, self.low + (pixel - self.from) / (self.to - self.from) * (self.high - self.low))
+    }
+
     /// Pixel of any value, moved to the nearer end where it lies outside; 0 and below go to the low end.
     pub fn clamped(&self, value: f64) -> f64 {
         if value <= 0.0 {

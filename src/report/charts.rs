@@ -2,9 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use crate::experiment::results::Variant;
+use crate::experiment::results::{PixelVariance, PredictionRow, Variant};
 use crate::sampling::{Points, Preset, SamplerSpec, point_set};
 use crate::stats::Estimate;
+use crate::stats::spectrum::Ring;
 
 use super::ablation::{Ablation, ablations};
 use super::bias_variance::{self, BiasVariance, Group, bias_variance_chart};
@@ -17,8 +18,9 @@ use super::pareto::{Trial, pareto_chart};
 use super::pictures::{NamedPoints, point_set_contact_sheet};
 use super::plots::{Datum, Floor, Guide, Plot, Series, loglog_chart, small_multiples};
 use super::provenance;
-use super::sections::pattern_spp;
+use super::sections::{pattern_spp, peers_of};
 use super::shares::{Share, SharePanel, share_chart};
+use super::spectra::{self, SetPower};
 use super::stability::{Against, Stretch, count_against, passes_against};
 use super::summarise::{Subject, Summary};
 
@@ -101,6 +103,78 @@ pub fn discrepancy(summary: &Summary) -> Option<Figure> {
 fn guide(slope: f64, label: &str) -> Guide {
     Guide { slope, label: label.to_owned() }
 }
+
+/// Power of point sets by the length of the frequency, a panel for the literal reading and one for the others.
+pub fn radial_power(summary: &Summary, all: &[SetPower]) -> Option<Figure> {
+    let is_literal = |found: &&SetPower| summary.samplers[found.sampler].label.ends_with(":sheet");
+    let line = |found: &SetPower| {
+        let datum = |ring: &Ring| Datum {
+            x: f64::from(ring.radius),
+            y: ring.mean,
+            interval: Some((ring.interval[0], ring.interval[1])),
+            is_pale: false,
+        };
+        series(summary, found.sampler, found.rings.iter().map(datum).collect())
+    };
+    let (literal, others): (Vec<&SetPower>, Vec<&SetPower>) = all.iter().partition(is_literal);
+    let panel = |title: &str, all: Vec<&SetPower>| Plot {
+        title: title.to_owned(),
+        series: all.into_iter().map(line).collect(),
+        guides: Vec::new(),
+        floor: Some(Floor { value: 1.0, label: "independent points".to_owned() }),
+    };
+    let panels = [panel("read literally", literal), panel("decisions kept apart", others)];
+    let panels: Vec<Plot> = panels.into_iter().filter(|panel| !panel.series.is_empty()).collect();
+    if panels.is_empty() {
+        return None;
+    }
+    let subtitle = format!(
+        "{} points of one decision in one pixel, mean of {} randomisations and all directions, 95 % bands",
+        spectra::POINTS,
+        spectra::SETS
+    );
+    let axes = ["length of the frequency ν (waves across the unit square)", "power P (no unit)"];
+    let ticks = vec![1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
+    let frame = Frame { x_ticks: ticks, ..frame(summary, "Power of the point sets by frequency", &subtitle, axes) };
+    Some(small_multiples(&frame, &panels, 2))
+}
+
+/// Measured over predicted variances of pixels; `None` where none were predicted. Of more than [`SHOWN_PIXELS`] the first.
+pub fn predicted_variance(summary: &Summary) -> Option<Figure> {
+    let found = &summary.predictions;
+    let pixels: Vec<[u32; 2]> = found.first()?.pixels.iter().map(|p| p.pixel).take(SHOWN_PIXELS).collect();
+    let kinds: Vec<String> = pixels.iter().map(|[x, y]| format!("pixel ({x}, {y})")).collect();
+    let row = |found: &PredictionRow| {
+        let dots = found.pixels.iter().take(SHOWN_PIXELS).enumerate().filter(|(_, p)| p.predicted > 0.0);
+        let dot = |(kind, p): (usize, &PixelVariance)| Dot {
+            kind,
+            value: p.measured.value / p.predicted,
+            interval: ends(&p.measured).map(|(low, high)| (low / p.predicted, high / p.predicted)),
+        };
+        let label = summary.samplers.iter().find(|s| s.canonical == found.sampler).map(|s| s.label.clone());
+        let way = if found.is_stationary { "exact" } else { "approx." };
+        let label = label.unwrap_or_else(|| found.sampler.clone());
+        DotRow { label: format!("{label} ({way})"), dots: dots.map(dot).collect() }
+    };
+    let mut counts: Vec<u32> = found.iter().map(|found| found.spp.asked).collect();
+    counts.sort_unstable();
+    counts.dedup();
+    let group = |&spp: &u32| DotGroup {
+        title: format!("{spp} spp"),
+        rows: found.iter().filter(|found| found.spp.asked == spp).map(row).collect(),
+    };
+    let groups: Vec<DotGroup> = counts.iter().map(group).collect();
+    let asked = summary.about.experiment.prediction.as_ref()?;
+    let subtitle = format!(
+        "{}, {} randomisations, 95 % χ² intervals; exact: the formula is a theorem for the sampler",
+        asked.scene, asked.seeds
+    );
+    let axes = ["measured / predicted variance of a pixel (no unit)", ""];
+    Some(dot_chart(&frame(summary, "Pixel variance, measured over predicted", &subtitle, axes), &kinds, 1.0, &groups))
+}
+
+/// As many pixels as a chart of dots has colours.
+const SHOWN_PIXELS: usize = 5;
 
 /// RMSE against samples per pixel, a panel a scene; where the literal reading was run, it has a row of its own.
 pub fn convergence(summary: &Summary) -> Option<Figure> {
@@ -324,16 +398,31 @@ pub fn speed(summary: &Summary, scene: usize) -> Option<Figure> {
     if trials.is_empty() {
         return None;
     }
+    let peers = peers_of(summary, scene);
+    let mut programs: Vec<&str> = peers.iter().map(|(point, _)| point.name.as_str()).collect();
+    programs.sort_unstable();
+    programs.dedup();
+    let peers: Vec<Trial> = peers
+        .into_iter()
+        .map(|(point, scale)| {
+            let number = programs.iter().position(|name| *name == point.name).unwrap_or(0);
+            Trial {
+                seconds_interval: point.seconds_range.map(|[low, high]| (low * scale, high * scale)),
+                error_interval: point.rmse_range.map(|[low, high]| (low, high)),
+                ..Trial::of_peer(&point.name, number, point.seconds * scale, point.rmse)
+            }
+        })
+        .collect();
     let name = &summary.scenes[scene].name;
     let mut threads: Vec<String> = summary.speeds.iter().map(|speed| speed.threads.to_string()).collect();
     threads.sort();
     threads.dedup();
     let subtitle = format!(
-        "{name}, {} pixels, {}; bars: range of seconds, 95 % interval of RMSE; this machine, {} threads",
+        "{name}, {} pixels, {}; boxes: intervals of the median seconds and of the RMSE; this machine, {} threads",
         summary.scenes[scene].size,
         replicates(summary),
         listed(&threads)
     );
     let axes = ["render time (s, median)", "RMSE (radiance, W/(m² sr))"];
-    Some(pareto_chart(&frame(summary, &format!("Speed against accuracy: {name}"), &subtitle, axes), &trials))
+    Some(pareto_chart(&frame(summary, &format!("Speed against accuracy: {name}"), &subtitle, axes), &trials, &peers))
 }

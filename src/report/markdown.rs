@@ -183,7 +183,7 @@ pub fn link_to(heading: &str) -> String {
 
 /// A heading's anchor as common viewers make it: lower case, spaces to hyphens; of other signs than letters and digits only
 /// `-` and `_` stay (a raised ² is no digit to them).
-fn anchor(heading: &str) -> String {
+pub(super) fn anchor(heading: &str) -> String {
     let kept = |c: &char| c.is_alphabetic() || c.is_ascii_digit() || " -_".contains(*c);
     heading.to_lowercase().chars().filter(kept).map(|c| if c == ' ' { '-' } else { c }).collect()
 }

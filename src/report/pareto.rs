@@ -1,13 +1,14 @@
 //! Speed against accuracy: seconds and error of every sampler and count, and which of them nothing beats at both.
 
-use super::axis::LogAxis;
-use super::figure::{Align, Bounds, Dash, Drawing, Figure, PAGE_WIDTH, Place, Text, shortened, text_width};
+use super::axis::{LogAxis, number_label};
+use super::figure::{Align, Bounds, Colour, Dash, Drawing, Figure, PAGE_WIDTH, Place, Text, shortened, text_width};
 use super::frame::{
     FOOT, Frame, Header, LeftOut, SMALL, draw_axis_names, draw_corner, draw_no_data, draw_small_x_ticks, draw_x_grid,
     draw_y_grid, left_margin,
 };
+use super::labels::kept_apart;
 use super::legend::KEY;
-use super::style::{GREY, INK, PALE, Style, draw_key, draw_marker, lightened, style_of};
+use super::style::{GREY, INK, Marker, PALE, Style, draw_key, draw_marker, lightened, style_of};
 
 /// One sampler at one count: what it cost and how far off it was.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,6 +37,16 @@ impl Trial {
     }
 }
 
+impl Trial {
+    /// A point of another program, the `number`-th of its scene's programs: a star, in a colour that no sampler has.
+    pub fn of_peer(name: &str, number: usize, seconds: f64, error: f64) -> Self {
+        const COLOURS: [Colour; 4] = [[170, 51, 119], [102, 102, 102], [120, 94, 240], [136, 34, 85]];
+        let filled = number % (2 * COLOURS.len()) < COLOURS.len();
+        let style = Style { colour: COLOURS[number % COLOURS.len()], marker: Marker::Star, filled, dash: Dash::Dotted };
+        Self { style, ..Self::of_sampler(name, "", seconds, error) }
+    }
+}
+
 /// Indices of the trials that no other beats: none is at least as good in both coordinates and better in one; by
 /// ascending seconds, of equal trials the first. Coordinates must be finite.
 pub fn pareto_front(trials: &[(f64, f64)]) -> Vec<usize> {
@@ -51,37 +62,46 @@ pub fn pareto_front(trials: &[(f64, f64)]) -> Vec<usize> {
 }
 
 /// Seconds (x) against error (y), both logarithmic, with the Pareto front as a step line and its members named; the
-/// others are drawn light. Axis names and title come from `frame`; its `x_ticks` are not used.
+/// others are drawn light. Grey diagonals join what is equally good for independent samples: error² · seconds is the same
+/// along one and a tenth along the next. `peers` are other programs' points: in the legend, in no line and no front.
+/// Axis names and title come from `frame`; its `x_ticks` are not used.
 ///
 /// The front is that of the medians. Trials whose seconds or error are not above 0 or not finite are left out and
 /// counted under the subtitle.
-pub fn pareto_chart(frame: &Frame, trials: &[Trial]) -> Figure {
-    drawn(frame, trials).finish(&frame.title)
+pub fn pareto_chart(frame: &Frame, trials: &[Trial], peers: &[Trial]) -> Figure {
+    drawn(frame, trials, peers).finish(&frame.title)
 }
 
-fn drawn(frame: &Frame, trials: &[Trial]) -> Drawing {
+fn drawn(frame: &Frame, trials: &[Trial], peers: &[Trial]) -> Drawing {
     let mut left_out = LeftOut::default();
-    let trials: Vec<Trial> =
-        trials.iter().filter(|trial| left_out.admits(&[trial.seconds, trial.error])).map(cleaned).collect();
+    let mut shown = |trials: &[Trial]| -> Vec<Trial> {
+        trials.iter().filter(|trial| left_out.admits(&[trial.seconds, trial.error])).map(cleaned).collect()
+    };
+    let (trials, peers) = (shown(trials), shown(peers));
     let header = Header::new(frame, &[left_out.note()]);
-    let labels = legend(&trials);
-    let widest = labels.iter().map(|(label, _)| text_width(label, SMALL, false)).fold(100.0, f64::max).min(200.0);
+    let labels = [legend(&trials), legend(&peers)].concat();
+    let widest = labels.iter().map(|(label, _)| text_width(label, SMALL, false)).fold(112.0, f64::max).min(200.0);
     let front = pareto_front(&trials.iter().map(|t| (t.seconds, t.error)).collect::<Vec<_>>());
-    let body = 440.0_f64.max(20.0 * (labels.len() + 3) as f64).max(NAME_STEP * (front.len() + 4) as f64);
-    let mut drawing = Drawing::new(PAGE_WIDTH, header.height + body + FOOT);
+    let body = 440.0_f64.max(20.0 * (labels.len() + 5) as f64).max(NAME_STEP * (front.len() + 4) as f64);
+    let mut drawing = Drawing::new(PAGE_WIDTH, header.height + ISO_ROOM + body + FOOT);
     header.draw(&mut drawing);
+    let all = [trials.as_slice(), &peers].concat();
     let bounds = Bounds {
-        left: left_margin(&axis_of(&errors(&trials), 0.0, 1.0).ticks(9)),
-        top: header.height,
+        left: left_margin(&axis_of(&errors(&all), 0.0, 1.0).ticks(9)),
+        top: header.height + ISO_ROOM,
         right: PAGE_WIDTH - widest - KEY - 32.0,
         bottom: drawing.height - FOOT,
     };
-    let chart = Chart::new(&trials, front, bounds);
+    let chart = Chart::new(&trials, &peers, front, bounds);
     chart.draw_frame(&mut drawing, frame);
+    chart.draw_equally_good(&mut drawing);
     draw_legend(&mut drawing, &labels, (bounds.right + 16.0, bounds.top + 8.0), widest);
     chart.draw(&mut drawing);
     drawing
 }
+
+/// Above the plot, for what the diagonals stand for.
+const ISO_ROOM: f64 = 14.0;
 
 /// The trial without intervals that cannot be drawn.
 fn cleaned(trial: &Trial) -> Trial {
@@ -115,12 +135,15 @@ fn draw_legend(drawing: &mut Drawing, labels: &[(String, Style)], (left, top): P
         drawing.line(&step, 1.6, INK, Dash::Solid);
         drawing.text((left + KEY + 6.0, y + 4.0), "Pareto front", SMALL, INK, Align::Left);
         drawing.text((left + KEY + 6.0, y + 20.0), "light: beaten by it", SMALL, GREY, Align::Left);
+        drawing.line(&[(left, y + 31.0), (left + KEY, y + 41.0)], 1.0, PALE, Dash::Solid);
+        drawing.text((left + KEY + 6.0, y + 40.0), "equally good", SMALL, GREY, Align::Left);
     }
 }
 
 /// Trials on their axes.
 struct Chart<'a> {
     trials: &'a [Trial],
+    peers: &'a [Trial],
     front: Vec<usize>,
     x: LogAxis,
     y: LogAxis,
@@ -145,12 +168,13 @@ fn axis_of(values: &[(f64, Option<(f64, f64)>)], from: f64, to: f64) -> LogAxis 
 
 impl<'a> Chart<'a> {
     /// Leaves room for names at the left, and below where the names run over the bottom.
-    fn new(trials: &'a [Trial], front: Vec<usize>, b: Bounds) -> Self {
-        let seconds: Vec<_> = trials.iter().map(|t| (t.seconds, t.seconds_interval)).collect();
+    fn new(trials: &'a [Trial], peers: &'a [Trial], front: Vec<usize>, b: Bounds) -> Self {
+        let all = [trials, peers].concat();
+        let seconds: Vec<_> = all.iter().map(|t| (t.seconds, t.seconds_interval)).collect();
         let widest = front.iter().map(|&i| text_width(&name(&trials[i]), NAME, false)).fold(0.0, f64::max);
         let x = axis_of(&seconds, b.left + widest.min(NAME_SHARE * (b.right - b.left)) + 10.0, b.right);
-        let y = axis_of(&errors(trials), b.bottom - NAME_STEP, b.top);
-        Self { trials, front, x, y, b }
+        let y = axis_of(&errors(&all), b.bottom - NAME_STEP, b.top);
+        Self { trials, peers, front, x, y, b }
     }
 
     fn place(&self, trial: &Trial) -> Place {
@@ -165,8 +189,52 @@ impl<'a> Chart<'a> {
         draw_axis_names(drawing, &self.b, frame);
     }
 
+    /// Lines of error² · seconds = 10^k, named above the plot where they leave it there.
+    fn draw_equally_good(&self, drawing: &mut Drawing) {
+        if self.trials.is_empty() && self.peers.is_empty() {
+            return;
+        }
+        let product = |(x, y): Place| {
+            let (seconds, error) = (self.x.value(x), self.y.value(y));
+            libm::log10(error * error * seconds)
+        };
+        let (least, most) = (product((self.b.left, self.b.bottom)), product((self.b.right, self.b.top)));
+        let mut named: Vec<(f64, String)> = Vec::new();
+        for k in libm::ceil(least) as i32..=libm::floor(most) as i32 {
+            let level = libm::pow(10.0, f64::from(k));
+            let x_at = |y: f64| self.x.pixel(level / (self.y.value(y) * self.y.value(y)));
+            let y_at = |x: f64| self.y.pixel((level / self.x.value(x)).sqrt());
+            let from = if x_at(self.b.top) >= self.b.left {
+                named.push((x_at(self.b.top), number_label(level)));
+                (x_at(self.b.top), self.b.top)
+            } else {
+                (self.b.left, y_at(self.b.left))
+            };
+            let to = if x_at(self.b.bottom) <= self.b.right {
+                (x_at(self.b.bottom), self.b.bottom)
+            } else {
+                (self.b.right, y_at(self.b.right))
+            };
+            // Corners may miss the plot by a rounding.
+            let inside = |(x, y): Place| (x.clamp(self.b.left, self.b.right), y.clamp(self.b.top, self.b.bottom));
+            drawing.line(&[inside(from), inside(to)], 1.0, lightened(PALE, 0.4), Dash::Solid);
+        }
+        let first = named.iter_mut().min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((_, text)) = first {
+            *text = format!("RMSE² · s = {text}");
+        }
+        let width = |text: &str| text_width(text, NAME, false);
+        let spans: Vec<(f64, f64)> =
+            named.iter().map(|(x, text)| (x.max(self.b.left + width(text) / 2.0), width(text))).collect();
+        for (((_, text), &(x, _)), shown) in named.iter().zip(&spans).zip(kept_apart(&spans, 8.0)) {
+            if shown {
+                drawing.text((x, self.b.top - 4.0), text, NAME, GREY, Align::Centre);
+            }
+        }
+    }
+
     fn draw(&self, drawing: &mut Drawing) {
-        if self.trials.is_empty() {
+        if self.trials.is_empty() && self.peers.is_empty() {
             draw_no_data(drawing, &self.b);
             return;
         }
@@ -176,6 +244,9 @@ impl<'a> Chart<'a> {
         }
         let on_front = |i: &usize| self.front.contains(i);
         let (front, others): (Vec<usize>, Vec<usize>) = (0..self.trials.len()).partition(on_front);
+        for (trials, light) in [(&others, 0.55), (&front, 0.0)] {
+            trials.iter().for_each(|&i| self.draw_box(drawing, &self.trials[i], light));
+        }
         for &i in &others {
             self.draw_trial(drawing, &self.trials[i], 0.55);
         }
@@ -184,20 +255,34 @@ impl<'a> Chart<'a> {
         for &i in &front {
             self.draw_trial(drawing, &self.trials[i], 0.0);
         }
+        for peer in self.peers {
+            self.draw_box(drawing, peer, 0.0);
+            self.draw_trial(drawing, peer, 0.0);
+        }
     }
 
-    /// A marker with its intervals as a cross of bars; `light` moves its colours towards white.
+    /// The two intervals of a trial as a box; a cross where there is but one of them.
+    fn draw_box(&self, drawing: &mut Drawing, trial: &Trial, light: f64) {
+        let ((x, y), colour) = (self.place(trial), lightened(trial.style.colour, light));
+        let across = trial.seconds_interval.map(|(low, high)| (self.x.clamped(low), self.x.clamped(high)));
+        let up = trial.error_interval.map(|(low, high)| (self.y.clamped(low), self.y.clamped(high)));
+        let bars = lightened(trial.style.colour, light.max(0.35));
+        match (across, up) {
+            (Some((left, right)), Some((bottom, top))) => {
+                drawing.rectangle(Bounds { left, top, right, bottom }, colour, 0.22);
+                let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)];
+                drawing.line(&corners, 0.9, bars, Dash::Solid);
+            }
+            (Some((left, right)), None) => drawing.line(&[(left, y), (right, y)], 1.6, bars, Dash::Solid),
+            (None, Some((bottom, top))) => drawing.line(&[(x, bottom), (x, top)], 1.6, bars, Dash::Solid),
+            (None, None) => {}
+        }
+    }
+
+    /// A marker; `light` moves its colours towards white.
     fn draw_trial(&self, drawing: &mut Drawing, trial: &Trial, light: f64) {
         let style = Style { colour: lightened(trial.style.colour, light), ..trial.style };
-        let bars = lightened(trial.style.colour, light.max(0.35));
-        let (x, y) = self.place(trial);
-        if let Some((low, high)) = trial.seconds_interval {
-            drawing.line(&[(self.x.clamped(low), y), (self.x.clamped(high), y)], 1.6, bars, Dash::Solid);
-        }
-        if let Some((low, high)) = trial.error_interval {
-            drawing.line(&[(x, self.y.clamped(low)), (x, self.y.clamped(high))], 1.6, bars, Dash::Solid);
-        }
-        draw_marker(drawing, (x, y), if light > 0.0 { 3.0 } else { 4.2 }, &style);
+        draw_marker(drawing, self.place(trial), if light > 0.0 { 3.0 } else { 4.2 }, &style);
     }
 
     /// From the top edge down to the cheapest member, along the steps, and out to the right edge.
@@ -242,11 +327,13 @@ impl<'a> Chart<'a> {
         }
     }
 
-    /// First and last row of pixels that a trial's marker and vertical bar take.
+    /// First and last row of pixels that names keep clear of for a trial: its marker and its box, of a tall box (an error that is
+    /// hardly known) the middle alone, since a name reads well on its light tint and would be far from its own marker else.
     fn rows(&self, trial: &Trial) -> (f64, f64) {
         let y = self.place(trial).1;
         let (low, high) = trial.error_interval.unwrap_or((trial.error, trial.error));
-        (self.y.clamped(high).min(y - 6.0), self.y.clamped(low).max(y + 6.0))
+        let reach = |end: f64| self.y.clamped(end).clamp(y - TALL, y + TALL);
+        (reach(high).min(y - 6.0), reach(low).max(y + 6.0))
     }
 
     /// Baselines of the front's names: each just below its marker or below the name before it; at the bottom moved up
@@ -271,6 +358,8 @@ impl<'a> Chart<'a> {
 /// Size of a name in pixels, and from one name's line to the next.
 const NAME: f64 = 11.0;
 const NAME_STEP: f64 = 12.5;
+/// How far a box keeps names off above and below its marker.
+const TALL: f64 = 20.0;
 /// Names take at most this share of the plot's width.
 const NAME_SHARE: f64 = 0.4;
 
@@ -310,7 +399,7 @@ mod tests {
         let frame = Frame::default();
         let trials = [("ld:best", 0.0, 1.0), ("ld:best", 1.0, f64::NAN), ("ld:best", 1.0, -1.0)];
         let trials = trials.map(|(name, seconds, error)| Trial::of_sampler(name, "4 spp", seconds, error));
-        let svg = pareto_chart(&frame, &trials).svg;
+        let svg = pareto_chart(&frame, &trials, &[]).svg;
         assert!(svg.contains("2 points not shown: not above 0 · 1 point not shown: not finite"), "{svg}");
         assert!(svg.contains("no data"));
     }
@@ -337,7 +426,8 @@ mod tests {
                         }
                     })
                     .collect();
-                drawn(&Frame::default(), &trials).assert_legible();
+                let (ours, peers) = trials.split_at(trials.len() * 3 / 4);
+                drawn(&Frame::default(), ours, peers).assert_legible();
                 Ok(())
             })
             .unwrap();
@@ -348,7 +438,7 @@ mod tests {
         let trial = |i: i32| {
             Trial::of_sampler("ld:best", &format!("{i} spp"), 1.01 + 1e-3 * f64::from(i), 2.0 - 1e-3 * f64::from(i))
         };
-        let drawing = drawn(&Frame::default(), &(0..40).map(trial).collect::<Vec<_>>());
+        let drawing = drawn(&Frame::default(), &(0..40).map(trial).collect::<Vec<_>>(), &[]);
         drawing.assert_legible();
         assert_eq!(drawing.finish("").svg.matches(" spp\n").count(), 40);
     }

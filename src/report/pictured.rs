@@ -14,7 +14,7 @@ use super::shots::{PictureSet, Shot, equal_time};
 use super::summarise::Summary;
 
 /// Reads an image; one that is not there is an error like any other.
-fn image(dir: &Path, id: &str) -> Result<Image> {
+pub(super) fn load(dir: &Path, id: &str) -> Result<Image> {
     read_image(dir, id, None)
 }
 
@@ -24,13 +24,13 @@ fn shown(image: &Image, exposure: f32) -> Rgb8 {
 }
 
 /// The pictures' two reference halves and their mean, or the closed form.
-fn truth(dir: &Path, set: &PictureSet) -> Result<Truth> {
+pub(super) fn truth(dir: &Path, set: &PictureSet) -> Result<Truth> {
     let row = set.reference.as_ref();
     let row =
         row.ok_or_else(|| Error::incomplete(dir.display(), "expected a reference of the pictures, found none"))?;
     let (a, b) = match &row.halves {
-        None => (image(dir, &row.id)?, image(dir, &row.id)?),
-        Some([a, b]) => (image(dir, a)?, image(dir, b)?),
+        None => (load(dir, &row.id)?, load(dir, &row.id)?),
+        Some([a, b]) => (load(dir, a)?, load(dir, b)?),
     };
     let mean = |(a, b): (&[f32; 3], &[f32; 3])| [0, 1, 2].map(|c| ((f64::from(a[c]) + f64::from(b[c])) / 2.0) as f32);
     let pixels = std::iter::zip(&a.pixels, &b.pixels).map(mean).collect();
@@ -44,7 +44,7 @@ fn truth(dir: &Path, set: &PictureSet) -> Result<Truth> {
 pub fn stages(dir: &Path, set: &PictureSet) -> Result<Rgb8> {
     let rows = set.stages_shown();
     let images: Vec<Rgb8> =
-        rows.iter().map(|row| image(dir, &row.id).map(|i| shown(&i, set.exposure))).collect::<Result<_>>()?;
+        rows.iter().map(|row| load(dir, &row.id).map(|i| shown(&i, set.exposure))).collect::<Result<_>>()?;
     let words = ["pixel centres, albedo", "+ sampled pixel", "+ sampled lens", "+ sampled lights"];
     let cells: Vec<StripCell> = rows
         .iter()
@@ -86,14 +86,14 @@ struct Shown<'a> {
 /// Kind `Input` where an image cannot be read.
 pub fn strips(dir: &Path, summary: &Summary, set: &PictureSet) -> Result<Strips> {
     let truth = truth(dir, set)?;
-    let load = |shot: &Shot| image(dir, &shot.row.id);
+    let of = |shot: &Shot| load(dir, &shot.row.id);
     let equal_spp: Vec<Shown> = set
         .at_equal_spp()
         .into_iter()
-        .map(|shot| Ok(Shown { shot, image: load(shot)?, captions: captions(&shot.row) }))
+        .map(|shot| Ok(Shown { shot, image: of(shot)?, captions: captions(&shot.row) }))
         .collect::<Result<_>>()?;
     let images: Vec<&Image> = equal_spp.iter().map(|shown| &shown.image).collect();
-    let found = find_details(dir, set, &truth, &images);
+    let found = found_details(dir, set, &truth, &images);
     let crops: Vec<Crop> = found.iter().map(|detail| detail.crop).collect();
     let on_screen = shown(&truth.mean, set.exposure);
     let equal_time = match equal_time(summary, set) {
@@ -103,7 +103,7 @@ pub fn strips(dir: &Path, summary: &Summary, set: &PictureSet) -> Result<Strips>
                 .iter()
                 .map(|choice| {
                     let captions = timed_captions(choice.seconds, &choice.shot.row);
-                    Ok(Shown { shot: choice.shot, image: load(choice.shot)?, captions })
+                    Ok(Shown { shot: choice.shot, image: of(choice.shot)?, captions })
                 })
                 .collect::<Result<_>>()?;
             Some(detail_strip(summary, set, &truth, &timed, &crops)?)
@@ -121,9 +121,9 @@ pub fn strips(dir: &Path, summary: &Summary, set: &PictureSet) -> Result<Strips>
 }
 
 /// The details of a scene; none where an image of its stages is not there.
-fn find_details(dir: &Path, set: &PictureSet, truth: &Truth, images: &[&Image]) -> Vec<Detail> {
+pub(super) fn found_details(dir: &Path, set: &PictureSet, truth: &Truth, images: &[&Image]) -> Vec<Detail> {
     let rows = set.stages_shown().into_iter();
-    let stages: Option<Vec<_>> = rows.map(|row| Some((row.stage, image(dir, &row.id).ok()?))).collect();
+    let stages: Option<Vec<_>> = rows.map(|row| Some((row.stage, load(dir, &row.id).ok()?))).collect();
     let is_complete = set.stages.len() == set.stages_planned();
     let stages = stages.filter(|_| is_complete).and_then(Stages::new);
     stages.map_or(Vec::new(), |stages| details(&stages, &truth.mean, images))

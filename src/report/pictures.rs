@@ -416,7 +416,7 @@ fn rounded_up(value: f64) -> f64 {
 }
 
 /// Blue at −1, white at 0, red at 1 and linear between in sRGB; ends of ColorBrewer's RdBu, safe for the colour-blind.
-fn diverging(t: f64) -> Colour {
+pub(super) fn diverging(t: f64) -> Colour {
     let end = if t < 0.0 { [33, 102, 172] } else { [178, 24, 43] };
     lightened(end, 1.0 - t.abs().min(1.0))
 }

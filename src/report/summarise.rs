@@ -175,7 +175,7 @@ pub struct PointSet {
     pub id: String,
 }
 
-/// Seconds that the images of a cell took.
+/// Seconds that the images of a cell take.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Speed {
     /// Index of the scene.
@@ -184,12 +184,17 @@ pub struct Speed {
     pub sampler: usize,
     /// Samples per pixel.
     pub spp: Count,
-    /// Median over images, with their range as its interval: for eight images a 99 % one, whatever the distribution.
+    /// Median with its interval ([`median_interval`](crate::stats::median_interval)): of the rounds where there are any, else of
+    /// the replicates, each of which was timed as it was made.
     pub seconds: Estimate,
-    /// How many images were timed.
-    pub images: usize,
-    /// Threads that worked, most of all images.
+    /// How many timings it is the median of.
+    pub timings: usize,
+    /// Whether these are rounds.
+    pub is_in_rounds: bool,
+    /// Threads that worked, most of all timings.
     pub threads: usize,
+    /// Share of the seconds that drawing the random numbers alone takes, 0 to 1, median over rounds with its interval.
+    pub sampling: Option<Estimate>,
 }
 
 impl Summary {

@@ -9,9 +9,10 @@ use crate::film::write_whole;
 
 use super::charts::of_scene;
 use super::figure::{Figure, Rgb8};
+use super::sections::Measurements;
 use super::shots::PictureSet;
 use super::summarise::{Summary, summarise};
-use super::{charts, pictured, provenance, sections, stability, tables};
+use super::{charts, page, pictured, provenance, sections, spectra, stability, tables};
 
 /// What became of a figure.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -73,7 +74,7 @@ fn details_path(dir: &Path) -> PathBuf {
     dir.join("figures").join("details.txt")
 }
 
-/// Writes `report.md`, `summary.csv`, `slopes.csv`, where it is asked about `stability.csv`, and `figures/` from the rows in
+/// Writes `report.md`, `report.html`, `summary.csv`, `slopes.csv`, where it is asked about `stability.csv`, and `figures/` from the rows in
 /// `dir`.
 ///
 /// The same rows, timings and images give the same bytes; `summary.csv` and `slopes.csv` depend on rows alone.
@@ -90,24 +91,30 @@ pub fn write(dir: &Path) -> Result<Written> {
     rows.retain(|row| about.fits(row));
     let timings = if timings_path(dir).exists() { read_timings(&timings_path(dir))? } else { Vec::new() };
     let summary = summarise(&rows, &timings, &about);
-    let figures = draw(dir, &summary)?;
+    let measured = Measurements::of(&summary);
+    let figures = draw(dir, &summary, &measured)?;
     write_whole(&dir.join("summary.csv"), tables::summary_csv(&summary).as_bytes())?;
     write_whole(&dir.join("slopes.csv"), tables::slopes_csv(&summary).as_bytes())?;
     if !summary.stability.is_empty() {
         write_whole(&dir.join("stability.csv"), stability::csv(&summary).as_bytes())?;
     }
     let report = dir.join("report.md");
-    write_whole(&report, sections::report(&summary, &figures).as_bytes())?;
+    let text = sections::report_with(&summary, &figures, &measured);
+    write_whole(&report, text.as_bytes())?;
+    page::write(dir, &summary, &text)?;
     Ok(Written { report, summary, figures })
 }
 
 /// Draws all figures.
-fn draw(dir: &Path, summary: &Summary) -> Result<Figures> {
+fn draw(dir: &Path, summary: &Summary, measured: &Measurements) -> Result<Figures> {
     let mut pen =
         Pen { folder: dir.join("figures"), stamp: provenance::line(&summary.about), figures: Figures::default() };
     let no_rows = || "its rows are not there".to_owned();
     pen.raster("point-sets", charts::point_sets(summary).ok_or_else(no_rows))?;
     pen.raster("failures", charts::failures(summary).ok_or_else(no_rows))?;
+    pen.raster("power-spectra", spectra::maps(summary, measured.power()).ok_or_else(no_rows))?;
+    pen.chart("radial-power", charts::radial_power(summary, measured.power()))?;
+    pen.chart("predicted-variance", charts::predicted_variance(summary))?;
     pen.chart("discrepancy", charts::discrepancy(summary))?;
     pen.chart("error-spectrum", charts::error_spectrum(summary))?;
     pen.chart("convergence", charts::convergence(summary))?;

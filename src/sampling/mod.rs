@@ -4,6 +4,7 @@
 
 pub mod divisor;
 mod domain;
+pub mod halton;
 pub mod hash;
 mod layout;
 pub mod radical;
@@ -19,3 +20,13 @@ pub use layout::{Claim, Decision, Dim1, Dim2, SampleLayout};
 pub use sampler::{ALGORITHM, PixelKey, PointSource, Sampler, point_set};
 pub use set::SamplerSet;
 pub use spec::{MAX_SAMPLES, Order, Points, Preset, Random, SamplerSpec, Scope, every_legal_spec};
+
+/// What `f` makes of each element. A loop, as `array::map` is a function of its own that the kernels of wide vectors would call.
+#[inline(always)]
+fn each<T: Copy, U: Copy + Default, const N: usize>(from: &[T; N], f: impl Fn(T) -> U) -> [U; N] {
+    let mut to = [U::default(); N];
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = f(*from);
+    }
+    to
+}

@@ -1,7 +1,5 @@
-//! Radical inverses: van der Corput, Halton, Hammersley, and Halton with nested random digit permutations.
+//! Radical inverses: van der Corput, Halton, Hammersley.
 
-use super::divisor::Divisor;
-use super::hash::bits64;
 use crate::mutants::{Mutant, planted, wrong};
 
 /// The primes that Halton's first axes take as bases.
@@ -38,87 +36,8 @@ pub fn radical_inverse(base: u32, index: u32) -> u32 {
 
 /// A planted bug, or false.
 #[inline(always)]
-fn is_in_single() -> bool {
+pub(super) fn is_in_single() -> bool {
     planted(Mutant::RadicalInverseInSingle)
-}
-
-/// An axis of Halton's sequence: a base, and as many of its digits as tell `n` indices apart, made ready.
-#[derive(Debug, Clone, Copy)]
-pub struct HaltonAxis {
-    base: Divisor,
-    digits: u32,
-    /// baseᵈⁱᵍⁱᵗˢ, below 2³².
-    power: Divisor,
-}
-
-impl HaltonAxis {
-    /// The axis of base `base`, one of [`PRIMES`], for indices below `n` ≤ 2²⁴.
-    pub fn new(base: u32, n: u32) -> Self {
-        Self::with_digits(base, digit_count(base, n))
-    }
-
-    fn with_digits(base: u32, digits: u32) -> Self {
-        Self { base: Divisor::new(base.into()), digits, power: Divisor::new(u64::from(base).pow(digits)) }
-    }
-
-    /// The base.
-    pub fn base(&self) -> u32 {
-        self.base.value() as u32
-    }
-
-    /// [`radical_inverse`] of several indices below n at once.
-    #[inline(always)]
-    pub fn radical_inverses<const N: usize>(&self, indices: &[u32; N]) -> [u32; N] {
-        let base = self.base();
-        if base == 2 || is_in_single() {
-            return indices.map(|index| radical_inverse(base, index));
-        }
-        let mut rest = indices.map(u64::from);
-        let mut mirror = [0u64; N];
-        // Zeros that follow the last digit multiply mirror and power alike.
-        for _ in 0..self.digits {
-            for (rest, mirror) in rest.iter_mut().zip(&mut mirror) {
-                let quotient = self.base.quotient(*rest);
-                *mirror = *mirror * u64::from(base) + (*rest - quotient * u64::from(base));
-                *rest = quotient;
-            }
-        }
-        mirror.map(|m| self.power.quotient(m << 32) as u32)
-    }
-
-    /// Halton coordinates under nested random digit permutations, as 32-bit fractions (Owen 1995, doi:10.1007/978-1-4612-2552-2_19).
-    ///
-    /// The j-th digit is permuted by d ↦ (a·d + c) mod b with (a, c), a ≠ 0, drawn afresh for each prefix of j − 1 digits. For
-    /// prime b these maps are sharply 2-transitive: any two digits go to any two different digits equally often, so all
-    /// pairwise distributions, and with them every variance and every `E[D²]`, equal those of uniform random permutations
-    /// (Matoušek 1998, doi:10.1006/jcom.1998.0489). After the digits that tell all indices apart, the infinitely many zeros that
-    /// follow become independent uniform digits: one uniform tail.
-    #[inline(always)]
-    pub fn digit_scrambled<const N: usize>(&self, indices: &[u32; N], key: u64) -> [u32; N] {
-        let b = self.base.value();
-        let mut rest = indices.map(u64::from);
-        let (mut prefix, mut mirror) = ([0u64; N], [0u64; N]);
-        let mut power = 1u64;
-        for level in 0..u64::from(self.digits) {
-            for lane in 0..N {
-                let quotient = self.base.quotient(rest[lane]);
-                let digit = rest[lane] - quotient * b;
-                rest[lane] = quotient;
-                let draw = bits64(key, prefix[lane] | (level << 40));
-                let factor = 1 + (((draw >> 32) * (b - 1)) >> 32);
-                let offset = ((draw & 0xffff_ffff) * b) >> 32;
-                mirror[lane] = mirror[lane] * b + self.base.remainder(factor * digit + offset);
-                prefix[lane] += if planted(Mutant::DigitsNotNested) { 0 } else { digit * power };
-            }
-            power *= b;
-        }
-        let mut fractions = [0; N];
-        for lane in 0..N {
-            let tail = bits64(key, prefix[lane] | (u64::from(self.digits) << 40)) >> 32;
-            fractions[lane] = self.power.quotient((mirror[lane] << 32) | tail) as u32;
-        }
-        fractions
-    }
 }
 
 /// Radical inverse φ_b correctly rounded to f64, for measuring point sets.
@@ -135,11 +54,6 @@ pub fn digit_count(base: u32, n: u32) -> u32 {
         digits += 1;
     }
     digits
-}
-
-/// One of [`HaltonAxis::digit_scrambled`], with as many digits as asked.
-pub fn digit_scrambled(base: u32, digits: u32, index: u32, key: u64) -> u32 {
-    HaltonAxis::with_digits(base, digits).digit_scrambled(&[index], key)[0]
 }
 
 #[cfg(test)]
@@ -166,58 +80,6 @@ mod tests {
             }
             let (mirror, power) = mirrored(base, (1 << 24) - 1);
             assert!(mirror < power && power < 1 << 32);
-        }
-    }
-
-    /// The definition, one index at a time, with the processor's own division.
-    fn scrambled(base: u32, digits: u32, index: u32, key: u64) -> u32 {
-        let b = u64::from(base);
-        let (mut rest, mut prefix, mut power, mut mirror) = (index, 0u64, 1u64, 0u64);
-        for level in 0..digits {
-            let digit = rest % base;
-            rest /= base;
-            let draw = bits64(key, prefix | (u64::from(level) << 40));
-            let factor = 1 + (((draw >> 32) * (b - 1)) >> 32) as u32;
-            let offset = (((draw & 0xffff_ffff) * b) >> 32) as u32;
-            mirror = mirror * b + u64::from((factor * digit + offset) % base);
-            prefix += u64::from(digit) * power;
-            power *= b;
-        }
-        let tail = bits64(key, prefix | (u64::from(digits) << 40)) >> 32;
-        (((mirror << 32) | tail) / power) as u32
-    }
-
-    #[test]
-    fn blocks_equal_the_definition() {
-        for base in PRIMES {
-            for n in [1u32, 2, 3, 26, 1000, 1 << 24] {
-                let axis = HaltonAxis::new(base, n);
-                let digits = digit_count(base, n);
-                for round in 0..200u64 {
-                    let key = bits64(round, u64::from(base));
-                    let indices: [u32; 16] = std::array::from_fn(|l| match (round, l) {
-                        (_, 0) => n - 1,
-                        (_, 1) => 0,
-                        _ => (bits64(key, l as u64) % u64::from(n)) as u32,
-                    });
-                    assert_eq!(axis.radical_inverses(&indices), indices.map(|i| radical_inverse(base, i)));
-                    assert_eq!(axis.digit_scrambled(&indices, key), indices.map(|i| scrambled(base, digits, i, key)));
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn scrambled_digits_stay_a_net_in_their_base() {
-        for base in [2u32, 3, 5, 7] {
-            let n = base.pow(3);
-            for key in 0..20 {
-                let axis = HaltonAxis::new(base, n);
-                let fraction = |i| u64::from(axis.digit_scrambled(&[i], key)[0]);
-                let mut strata: Vec<u32> = (0..n).map(|i| ((fraction(i) * u64::from(n)) >> 32) as u32).collect();
-                strata.sort_unstable();
-                assert_eq!(strata, (0..n).collect::<Vec<_>>(), "base {base}, key {key}");
-            }
         }
     }
 }

@@ -1,9 +1,13 @@
 //! Samplers at work: a number is a pure function of (seed, pixel, sample index, dimension).
 
+use std::hint::black_box;
+
 use super::divisor::Divisor;
+use super::each;
+use super::halton::HaltonAxis;
 use super::hash::{Permutation, bits32, derive, mix64, unit_f32};
 use super::layout::{Claim, Decision, Dim1, Dim2, SampleLayout};
-use super::radical::{HaltonAxis, PRIMES, radical_inverse_f64};
+use super::radical::{PRIMES, radical_inverse_f64};
 use super::set::{SamplerSet, sheet_1d};
 use super::sobol::{SobolAxis, owen_scramble};
 use super::spec::{MAX_SAMPLES, Order, Points, Random, SamplerSpec, Scope};
@@ -167,7 +171,8 @@ impl PointSource for Sampler {
         for (block, (x, y)) in x.chunks_mut(BLOCK).zip(y.chunks_mut(BLOCK)).enumerate() {
             let places = source.places(first + (block * BLOCK) as u32, x.len(), &keys);
             for (axis, out) in [x, y].into_iter().enumerate() {
-                put_units(out, &source.fractions(axis, &places, &keys));
+                // Unseen by the compiler, which else works out for all kinds of axes, before the loop, what one of them needs.
+                put_units(out, &source.fractions(axis, black_box(&places), &keys));
             }
         }
     }
@@ -176,7 +181,7 @@ impl PointSource for Sampler {
 /// The unit-interval floats of as many fractions as `out` takes.
 #[inline(always)]
 fn put_units(out: &mut [f32], fractions: &[u32; BLOCK]) {
-    let units = fractions.map(unit_f32);
+    let units = each(fractions, unit_f32);
     match <&mut [f32; BLOCK]>::try_from(&mut *out) {
         Ok(whole) => *whole = units,
         Err(_) => out.copy_from_slice(&units[..out.len()]),
@@ -223,16 +228,6 @@ enum AxisKind {
 struct Keys {
     axes: [u64; 2],
     shuffle: u64,
-}
-
-/// What `fraction` makes of each place.
-#[inline(always)]
-fn each(places: &[u32; BLOCK], fraction: impl Fn(u32) -> u32) -> [u32; BLOCK] {
-    let mut out = [0; BLOCK];
-    for (out, &place) in out.iter_mut().zip(places) {
-        *out = fraction(place);
-    }
-    out
 }
 
 const RANDOM_TAG: u64 = 1;
@@ -313,7 +308,8 @@ impl DecisionSampler {
         }
     }
 
-    /// π(i) for `count` ≤ [`BLOCK`] consecutive indices; what follows them is 0.
+    /// π(i) for `count` ≤ [`BLOCK`] consecutive indices. What follows them nobody reads: indices that go on, so that they stay a
+    /// row, or 0 where the order is shuffled.
     #[inline(always)]
     fn places(&self, first: u32, count: usize, keys: &Keys) -> [u32; BLOCK] {
         // Also in release: beyond its count Hammersley's x is 1 and strata begin anew.
@@ -321,7 +317,7 @@ impl DecisionSampler {
         assert!(end <= u64::from(self.samples), "samples {first} to {end} asked of {}", self.samples);
         let mut places = [0; BLOCK];
         for (lane, place) in (0..).zip(&mut places) {
-            *place = if (lane as usize) < count { first + lane } else { 0 };
+            *place = if (lane as usize) < count || self.spec.order != Order::Shuffle { first + lane } else { 0 };
         }
         if self.spec.order == Order::Shuffle && planted(Mutant::ShuffleWithReplacement) {
             places[..count].iter_mut().for_each(|place| *place = bits32(keys.shuffle, *place) % self.samples);
@@ -357,7 +353,7 @@ impl DecisionSampler {
                 self.randomised(key, each(places, u32::swap_bytes))
             }
             AxisKind::VanDerCorput => self.randomised(key, each(places, |i| (i + skipped).reverse_bits())),
-            AxisKind::Sobol(sobol) => self.randomised(key, sobol.fractions(places.map(|i| i + skipped))),
+            AxisKind::Sobol(sobol) => self.randomised(key, sobol.fractions(each(places, |i| i + skipped))),
         }
     }
 

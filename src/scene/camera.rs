@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::accel::{Accel, Ray};
+use crate::accel::{Accel, LANES, Packet, Ray};
 use crate::mutants::{Mutant, planted};
 use crate::sampling::{Dim2, warp};
 
@@ -112,12 +112,18 @@ impl Camera {
     pub fn auto_focus(&self, accel: &Accel) -> Option<f32> {
         const RAYS: u32 = 64;
         let (mut log_sum, mut hits) = (0.0f64, 0u32);
-        for i in 0..RAYS * RAYS {
-            let place = |k: u32| 0.5 + ((k as f32 + 0.5) / RAYS as f32 - 0.5) * 0.25;
-            let at = Vec2::new(place(i % RAYS) * self.size.0 as f32, place(i / RAYS) * self.size.1 as f32);
-            let ray = Ray { origin: self.pos, direction: self.through(at) };
+        // A packet for as many neighbours as it takes: these are too few rays to make the tree for single ones.
+        let mut packet = Packet::default();
+        for first in (0..RAYS * RAYS).step_by(LANES) {
+            for lane in 0..LANES {
+                let i = first + lane as u32;
+                let place = |k: u32| 0.5 + ((k as f32 + 0.5) / RAYS as f32 - 0.5) * 0.25;
+                let at = Vec2::new(place(i % RAYS) * self.size.0 as f32, place(i / RAYS) * self.size.1 as f32);
+                packet.set(lane, &Ray { origin: self.pos, direction: self.through(at) }, f32::INFINITY);
+            }
+            accel.closest(&mut packet);
             // The direction's part along `dir` is 1, so t is the depth.
-            if let Some(hit) = accel.closest_one(&ray, f32::INFINITY) {
+            for hit in (0..LANES).filter_map(|lane| packet.hit(lane)) {
                 log_sum += libm::log(f64::from(hit.t));
                 hits += 1;
             }

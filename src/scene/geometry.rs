@@ -1,6 +1,7 @@
 //! Surfaces as the light transport loop reads them: points, normals, texture coordinates, robust offsets.
 
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 
 use crate::accel::{LANES, Ray, Row, Triangle, column, set_column};
 use crate::mutants::{Mutant, planted};
@@ -75,6 +76,7 @@ pub struct Face {
 /// The mesh's triangles as shading reads them, with what depends on the triangle alone worked out.
 pub fn faces(mesh: &Mesh) -> Vec<Face> {
     (0..mesh.len())
+        .into_par_iter()
         .map(|index| {
             let corners = mesh.positions[index];
             Face {

@@ -3,17 +3,18 @@
 //! Nothing is written and nothing printed; what a person should know comes back as warnings.
 
 use std::collections::HashMap;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::Vec3;
+use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 use super::config::{Estimator, FramebufferConfig, MaterialPatch, SceneConfig};
+use super::cut::{self, Told, Triangles};
 use super::json::suggestion;
 use super::light::luma;
 use super::mesh::{Material, Mesh, Texture};
-use super::obj::{self, CheckedObj, MtlMaterial};
+use super::obj::{self, Faces, MtlMaterial, Obj};
 use crate::error::{Error, Result};
 use crate::film::srgb_decode;
 
@@ -26,8 +27,11 @@ const DEFAULT_STRENGTH: f32 = 10.0;
 /// Most pixels a texture, 2^26 (8192 × 8192): with 16 bits a channel its linear texels take 0.8 GB.
 const MAX_TEXELS: u64 = 1 << 26;
 
-/// Most bytes a mesh file, 2^30: reading takes about ten times as much memory.
+/// Most bytes a mesh file, 2^30: reading takes about three times as much memory.
 const MAX_MESH_BYTES: u64 = 1 << 30;
+
+/// Parts of a file whose polygons are cut at a time.
+const PARTS_AT_ONCE: usize = 64;
 
 /// Where to look, and what to change, beyond the scene file itself.
 #[derive(Debug, Clone, Default)]
@@ -218,6 +222,14 @@ struct Inputs {
 impl Inputs {
     /// Reads `path` and records it under `name`; `place` is where it is asked for.
     fn read(&mut self, path: &Path, name: &str, expected: &str, place: impl std::fmt::Display) -> Result<Vec<u8>> {
+        let bytes = self.fetch(path, name, expected, place)?;
+        let slot = self.reserve(name);
+        self.settle(slot, sha256(&bytes));
+        Ok(bytes)
+    }
+
+    /// Reads `path`, called `name` where it is asked for, at `place`; only from the folders that files must be within, if any are named.
+    fn fetch(&self, path: &Path, name: &str, expected: &str, place: impl std::fmt::Display) -> Result<Vec<u8>> {
         if let Some(within) = &self.within {
             // Links are followed before the question is asked.
             let real = path.canonicalize().ok().filter(|real| real.is_file());
@@ -226,13 +238,22 @@ impl Inputs {
                 return Err(Error::input(&place, what));
             }
         }
-        let bytes = std::fs::read(path)
-            .map_err(|e| Error::input(&place, format!("expected {expected}, found {}: {e}", path.display())))?;
-        let file = InputFile { name: name.to_owned(), sha256: sha256(&bytes) };
-        if !self.files.contains(&file) {
-            self.files.push(file);
+        std::fs::read(path)
+            .map_err(|e| Error::input(&place, format!("expected {expected}, found {}: {e}", path.display())))
+    }
+
+    /// Keeps the next place of the list for a file whose hash is not known yet.
+    fn reserve(&mut self, name: &str) -> usize {
+        self.files.push(InputFile { name: name.to_owned(), sha256: String::new() });
+        self.files.len() - 1
+    }
+
+    /// Gives the hash of a reserved place; the same file read before keeps its first place.
+    fn settle(&mut self, slot: usize, sha256: String) {
+        self.files[slot].sha256 = sha256;
+        if self.files[..slot].contains(&self.files[slot]) {
+            self.files.remove(slot);
         }
-        Ok(bytes)
     }
 }
 
@@ -296,21 +317,29 @@ impl Builder<'_> {
                 format!("expected a mesh file of at most {MAX_MESH_BYTES} bytes, found {size}"),
             ));
         }
-        let bytes = self.inputs.read(path, name, "a readable mesh file", name)?;
+        let bytes = self.inputs.fetch(path, name, "a readable mesh file", name)?;
         let mut libraries: Vec<PathBuf> = Vec::new();
-        let checked = obj::check_obj(&bytes, name, |rest, place| {
-            open_libraries(rest, place, path, &mut self.inputs, &mut self.said, &mut libraries)
-        })?;
+        // The OBJ stands before what it refers to.
+        let slot = self.inputs.reserve(name);
+        let (hash, obj) = rayon::join(
+            || sha256(&bytes),
+            || {
+                obj::read_obj(&bytes, name, |rest, place| {
+                    open_libraries(rest, place, path, &mut self.inputs, &mut self.said, &mut libraries)
+                })
+            },
+        );
+        let obj = obj?;
         drop(bytes);
-        self.said.extend(checked.warnings.iter().cloned());
-        self.known.extend(checked.materials.iter().map(|m| m.name.clone()));
-        if let Some(line) = checked.first_bare_face {
+        self.inputs.settle(slot, hash);
+        self.said.extend(obj.warnings.iter().cloned());
+        self.known.extend(obj.materials.iter().map(|m| m.name.clone()));
+        if let Some(line) = obj.first_bare_face {
             self.said.push(format!(
                 "{name}:{line}: faces before any usemtl have the default material, grey {DEFAULT_ALBEDO}"
             ));
         }
-        let models = read_geometry(&checked, name)?;
-        self.add_models(&models, &checked.materials, file, path)
+        self.add_faces(&obj, file, path)
     }
 
     /// Whether there are no more triangles than there may be.
@@ -335,29 +364,36 @@ impl Builder<'_> {
         }
     }
 
-    fn add_models(&mut self, models: &[tobj::Model], declared: &[MtlMaterial], file: u32, path: &Path) -> Result<()> {
+    /// Adds the triangles of all faces, part by part, in their order.
+    fn add_faces(&mut self, obj: &Obj, file: u32, path: &Path) -> Result<()> {
         let name = &self.config.mesh_files[file as usize];
+        let normals: Vec<Option<Vec3>> = obj.normals.par_iter().map(|n| cut::unit(n.as_dvec3())).collect();
         let mut index_of: HashMap<Option<usize>, u32> = HashMap::new();
         let mut told = Told::default();
-        for model in models {
-            let first = self.mesh.len();
-            append_faces(&model.mesh, &mut self.mesh, &mut told);
-            if self.mesh.len() == first {
-                continue;
-            }
-            let id = model.mesh.material_id;
-            let index = match index_of.get(&id) {
-                Some(index) => *index,
-                None => {
-                    let material = self.material(id.map(|i| &declared[i]), file, path)?;
-                    self.mesh.materials.push(material);
-                    self.declared.push(id.map(|i| declared[i].clone()));
-                    let index = self.mesh.materials.len() as u32 - 1;
-                    index_of.insert(id, index);
-                    index
+        self.mesh.reserve(obj.faces.iter().map(Faces::most_triangles).sum());
+        // Some at a time, so that a large mesh is not there twice.
+        for some in obj.faces.chunks(PARTS_AT_ONCE) {
+            let parts: Vec<Triangles> = some.par_iter().map(|faces| cut::triangles(obj, faces, &normals)).collect();
+            for part in parts {
+                self.mesh.positions.extend_from_slice(&part.positions);
+                self.mesh.normals.extend_from_slice(&part.normals);
+                self.mesh.uvs.extend_from_slice(&part.uvs);
+                told.add(part.told);
+                for (id, count) in part.runs.into_iter().filter(|(_, count)| *count > 0) {
+                    let index = match index_of.get(&id) {
+                        Some(index) => *index,
+                        None => {
+                            let material = self.material(id.map(|i| &obj.materials[i]), file, path)?;
+                            self.mesh.materials.push(material);
+                            self.declared.push(id.map(|i| obj.materials[i].clone()));
+                            let index = self.mesh.materials.len() as u32 - 1;
+                            index_of.insert(id, index);
+                            index
+                        }
+                    };
+                    self.mesh.material_of.resize(self.mesh.material_of.len() + count, index);
                 }
-            };
-            self.mesh.material_of.resize(self.mesh.len(), index);
+            }
         }
         self.said.extend(told.warnings(name));
         Ok(())
@@ -436,114 +472,6 @@ fn open_libraries(
         }
     }
     Ok(materials)
-}
-
-/// Hands the checked text to tobj. Polygons stay whole: tobj would cut them into fans, which is wrong where they are concave.
-fn read_geometry(checked: &CheckedObj, name: &str) -> Result<Vec<tobj::Model>> {
-    let options = tobj::LoadOptions { single_index: true, ..tobj::LoadOptions::default() };
-    let declared = |_: &Path| {
-        let names = (0..checked.materials.len()).map(obj::tobj_name);
-        let materials = names.clone().map(|name| tobj::Material { name, ..Default::default() }).collect();
-        Ok((materials, names.enumerate().map(|(i, name)| (name, i)).collect()))
-    };
-    let mut text = b"mtllib declared\n".chain(checked.text.as_slice());
-    let (models, _) = tobj::load_obj_buf(&mut text, &options, declared)
-        .map_err(|e| Error::input(name, format!("expected a mesh that tobj reads, found: {e}")))?;
-    Ok(models)
-}
-
-/// Things that are counted and told once a file.
-#[derive(Default)]
-struct Told {
-    degenerate: usize,
-    zero_normals: usize,
-    concave: usize,
-}
-
-impl Told {
-    fn warnings(&self, name: &str) -> impl Iterator<Item = String> + use<> {
-        let lines = [
-            (self.degenerate, "triangles without area left out"),
-            (self.zero_normals, "normals of length 0 replaced by the face's own"),
-            (self.concave, "polygons that are not convex: cut into a fan, which may overlap itself"),
-        ];
-        let name = name.to_owned();
-        lines.into_iter().filter(|(n, _)| *n > 0).map(move |(n, what)| format!("{name}: {n} {what}"))
-    }
-}
-
-/// Cuts the polygons of one model into triangles and appends them.
-fn append_faces(from: &tobj::Mesh, to: &mut Mesh, told: &mut Told) {
-    let corner = |i: u32| Vec3::from_slice(&from.positions[3 * i as usize..]);
-    let uv = |i: u32| {
-        if from.texcoords.is_empty() { Vec2::ZERO } else { Vec2::from_slice(&from.texcoords[2 * i as usize..]) }
-    };
-    // A polygon of n corners makes n - 2 triangles; no arities means triangles throughout.
-    let triangles = match from.face_arities.len() {
-        0 => from.indices.len() / 3,
-        polygons => from.indices.len() - 2 * polygons,
-    };
-    to.positions.reserve(triangles);
-    to.normals.reserve(triangles);
-    to.uvs.reserve(triangles);
-    let mut left = from.indices.as_slice();
-    let mut arities = from.face_arities.iter();
-    while !left.is_empty() {
-        let (face, rest) = left.split_at(arities.next().map_or(3, |&n| n as usize));
-        left = rest;
-        let start = fan_start(face, corner, told);
-        let at = |k: usize| face[(start + k) % face.len()];
-        for k in 1..face.len() - 1 {
-            let triangle = [at(0), at(k), at(k + 1)];
-            let positions = triangle.map(corner);
-            let Some(winding) = winding_normal(positions) else {
-                told.degenerate += 1;
-                continue;
-            };
-            to.positions.push(positions);
-            to.uvs.push(triangle.map(uv));
-            to.normals.push(triangle.map(|i| match from.normals.is_empty() {
-                true => winding,
-                false => unit(Vec3::from_slice(&from.normals[3 * i as usize..]).as_dvec3()).unwrap_or_else(|| {
-                    told.zero_normals += 1;
-                    winding
-                }),
-            }));
-        }
-    }
-}
-
-/// The corner whose fan covers the polygon without overlap: the first, unless the polygon is concave and another one does.
-fn fan_start(face: &[u32], corner: impl Fn(u32) -> Vec3, told: &mut Told) -> usize {
-    if face.len() == 3 {
-        return 0;
-    }
-    let points: Vec<DVec3> = face.iter().map(|&i| corner(i).as_dvec3()).collect();
-    let n = points.len();
-    let cross = |a: usize, b: usize, c: usize| (points[b % n] - points[a % n]).cross(points[c % n] - points[a % n]);
-    // Newell's normal: twice the polygon's area, whatever its shape.
-    let area: DVec3 = (1..n - 1).map(|k| cross(0, k, k + 1)).sum();
-    // The fan of a star-shaped corner has no triangle that turns the other way.
-    let rounding = -1e-9 * area.length_squared();
-    let covers = |s: usize| (1..n - 1).all(|k| cross(s, s + k, s + k + 1).dot(area) >= rounding);
-    // Looking at every corner of a huge polygon would take the square of its size.
-    let tried = if n <= 64 { n } else { 1 };
-    (0..tried).find(|&s| covers(s)).unwrap_or_else(|| {
-        told.concave += 1;
-        0
-    })
-}
-
-/// The unit vector along `v`; `None` where it is too short to have a direction in `f32`.
-fn unit(v: DVec3) -> Option<Vec3> {
-    let length = v.length();
-    (length as f32 > 0.0).then(|| (v / length).as_vec3())
-}
-
-/// Unit normal by the right-hand rule; `None` where the area is 0.
-fn winding_normal([a, b, c]: [Vec3; 3]) -> Option<Vec3> {
-    let [a, b, c] = [a, b, c].map(Vec3::as_dvec3);
-    unit((b - a).cross(c - a))
 }
 
 /// Kd; where it is black, Ks; where neither is given, white under a texture and else the default grey.

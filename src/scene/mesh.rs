@@ -25,6 +25,14 @@ impl Mesh {
         self.positions.len()
     }
 
+    /// Makes room for `more` triangles.
+    pub fn reserve(&mut self, more: usize) {
+        self.positions.reserve_exact(more);
+        self.normals.reserve_exact(more);
+        self.uvs.reserve_exact(more);
+        self.material_of.reserve_exact(more);
+    }
+
     /// Whether there is no triangle.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()

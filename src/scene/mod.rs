@@ -2,6 +2,7 @@
 pub mod camera;
 pub mod compile;
 pub mod config;
+pub mod cut;
 pub mod geometry;
 pub mod json;
 pub mod light;

@@ -54,6 +54,7 @@ pub mod flip;
 pub mod fourier;
 pub mod hypothesis;
 pub mod image_error;
+pub mod median;
 pub mod moments;
 pub mod pixel_variance;
 mod special;
@@ -72,6 +73,7 @@ pub use hypothesis::{
     t_test_of_squares, welch_test, z_test,
 };
 pub use image_error::Ensemble;
+pub use median::median_interval;
 pub use moments::{Estimate, Moments, jackknife, student_t_quantile, sum, t_interval, variance_interval};
 pub use tails::Tails;
 pub use trial::{Agreement, Decision, Replicates, Trial, assert_agree, assert_unbiased};

@@ -4,7 +4,9 @@
 //! then. `CHROMIUM` names the program where it is not on the path.
 #![cfg(unix)]
 
+mod accessibility;
 mod chromium;
+mod report;
 mod view;
 
 use chromium::Browser;

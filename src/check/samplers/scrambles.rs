@@ -14,8 +14,9 @@ use super::equivalence::{LEVEL, MARGIN, RatioFound, ratio_within, replicates_for
 use super::laws::{AxisLaw, owen_diagonal, set_errors, shared_digits};
 use super::reading::{PIXEL, Tickets, numbered_specs};
 use crate::check::{Check, Context, Finding, Kind, Tally};
+use crate::sampling::halton::digit_scrambled;
 use crate::sampling::hash::bits64;
-use crate::sampling::radical::{PRIMES, digit_count, digit_scrambled};
+use crate::sampling::radical::{PRIMES, digit_count};
 use crate::sampling::sobol::{SobolAxis, owen_scramble};
 use crate::sampling::{Decision, Order, Random, Sampler, SamplerSpec};
 

@@ -1,7 +1,8 @@
 //! Failures that show in the points themselves.
 
+use crate::sampling::halton::digit_scrambled;
 use crate::sampling::hash::{derive, derive_named, unit_f32};
-use crate::sampling::radical::{digit_count, digit_scrambled, radical_inverse, radical_inverse_f64};
+use crate::sampling::radical::{digit_count, radical_inverse, radical_inverse_f64};
 use crate::sampling::strata::in_stratum_f64;
 use crate::sampling::{Decision, PixelKey, PointSource, Preset, SampleLayout, Sampler, SamplerSpec, point_set};
 use crate::stats::discrepancy::{Points, star_2d, t_value};

@@ -2,9 +2,10 @@
 
 use crate::stats::{Estimate, student_t_quantile};
 
-use super::super::evidence::{Answer, above, interpolated, ratio_of_roots};
+use super::super::evidence::{Answer, above, ratio_of_roots};
 use super::super::markdown::{Page, table_ref};
 use super::super::numbers::{estimate, listed, short};
+use super::super::reach::{Stop, reached_in};
 use super::super::summarise::Summary;
 use super::flaws::flaws;
 use super::speed::timed;
@@ -37,7 +38,7 @@ fn budget(summary: &Summary, scene: usize, spp: u32) -> Option<Budget> {
 }
 
 /// The counts of uniform sampling that budgets are taken from: the smallest of at least 4, the middle one, the most.
-fn budget_counts(summary: &Summary) -> Vec<u32> {
+pub(super) fn budget_counts(summary: &Summary) -> Vec<u32> {
     let spp = &summary.about.experiment.spp;
     let small = spp.iter().copied().filter(|&n| n >= 4).min();
     let mut counts: Vec<u32> = [small, summary.middle_spp(), summary.most_spp()].into_iter().flatten().collect();
@@ -52,30 +53,30 @@ fn reached(summary: &Summary, scene: usize, seconds: f64) -> Vec<Reached> {
     let all = timed(summary, scene);
     (0..summary.samplers.len())
         .filter_map(|sampler| {
-            let trials: Vec<(f64, Estimate)> = all
+            let stops: Vec<Stop> = all
                 .iter()
                 .filter(|(cell, _)| cell.sampler == sampler)
-                .map(|(cell, speed)| (speed.seconds.value, cell.mse))
+                .map(|(cell, speed)| Stop { seconds: speed.seconds, mse: cell.mse })
                 .collect();
-            if let Some(mse) = interpolated(&trials, seconds) {
+            if let Some(mse) = reached_in(&stops, seconds) {
                 return Some(Reached { sampler, mse, is_last: false });
             }
-            let last = trials.last().filter(|(time, _)| *time < seconds)?;
-            Some(Reached { sampler, mse: last.1, is_last: true })
+            let last = stops.last().filter(|stop| stop.seconds.value < seconds)?;
+            Some(Reached { sampler, mse: last.mse, is_last: true })
         })
         .collect()
 }
 
 /// By how much a 95 % interval from `replicates` widens, so that `comparisons` of them hold at once (Bonferroni): the ratio of
 /// Student's quantiles at 0.05/comparisons and 0.05, replicates − 1 degrees of freedom.
-fn joint_factor(replicates: u32, comparisons: usize) -> f64 {
+pub(super) fn joint_factor(replicates: u32, comparisons: usize) -> f64 {
     let freedom = f64::from(replicates.max(2) - 1);
     let quantile = |tests: f64| student_t_quantile(1.0 - 0.025 / tests, freedom);
     quantile(comparisons.max(1) as f64) / quantile(1.0)
 }
 
 /// A ratio with the distances of its interval's ends, on a logarithmic scale, times `factor`.
-fn widened(ratio: &Estimate, factor: f64) -> Estimate {
+pub(super) fn widened(ratio: &Estimate, factor: f64) -> Estimate {
     let end = |end: f64| ratio.value * libm::pow(end / ratio.value, factor);
     Estimate { value: ratio.value, ci95: ratio.ci95.map(|ends| ends.map(end)) }
 }
@@ -135,7 +136,7 @@ fn equal_seconds(summary: &Summary, page: &mut Page) {
         if has_last { " †: its largest count takes less than the budget, so this is its error there." } else { "" };
     let caption = format!(
         "RMSE in W/(m² sr) at equal seconds, those of uniform sampling at {spp} spp: between the neighbouring counts of each sampler on a straight line of \
-         logarithms, values and interval ends alike; {}. The spread of the seconds is not in the intervals.{dagger}",
+         logarithms, values and interval ends alike; {}, to which the interval of the seconds adds what it makes of the error.{dagger}",
         level(summary)
     );
     tabulate(page, "equal-seconds", &caption, &head, &lines);
@@ -186,7 +187,7 @@ fn choice(summary: &Summary, page: &mut Page) {
     }
     let caption = "Which sampler for which budget: seconds that uniform sampling takes at the count in brackets; of the samplers that nothing speaks against in the scene (no error that stays, no bias \
                    seen, no neighbours that err alike, no set that decisions read in step or that is not randomised), the one with the smallest RMSE in W/(m² sr) reached in them, its ratio to uniform sampling's \
-                   with a 95 % interval, and those not told apart from it (5 % for all comparisons of a line together; the spread of the seconds is not in it); beside it the smallest RMSE of all, where that \
+                   with a 95 % interval, and those not told apart from it (no difference can be told at 5 % for all comparisons of a line together); beside it the smallest RMSE of all, where that \
                    is another's, with what speaks against it.";
     let head = [
         "scene",

@@ -31,9 +31,12 @@ mod pixels;
 mod points;
 mod predicates;
 mod prediction;
+mod reach;
 mod reference;
+mod sampling;
 mod scenes;
 mod shortcut;
+mod spectra;
 mod speed;
 mod stability;
 mod words;
@@ -41,14 +44,17 @@ mod words;
 use super::gallery::Failure;
 use super::markdown::Page;
 use super::pairing::{self, Paired};
+use super::spectra::{SetPower, spectra as spectra_of};
 use super::summarise::Summary;
 use super::write::{FigureState, Figures};
 pub use neighbours::pattern_spp;
+pub use sampling::peers_of;
 
 /// Names of sections that others link to.
 mod titles {
     pub const READING: &str = "How to read it";
     pub const WITHIN: &str = "Within a set";
+    pub const SPECTRA: &str = "Power spectra";
     pub const DECISIONS: &str = "Between decisions";
     pub const PIXELS: &str = "Between pixels";
     pub const WHICH: &str = "Which decision matters";
@@ -74,6 +80,8 @@ pub struct Measurements {
     paired: Vec<(usize, Vec<Paired>)>,
     /// Failures of methods.
     gallery: Vec<Failure>,
+    /// Power spectra of point sets.
+    power: Vec<SetPower>,
 }
 
 impl Measurements {
@@ -85,7 +93,15 @@ impl Measurements {
             tests: coupling::Tests::of(summary),
             paired: (0..summary.samplers.len()).filter_map(paired).collect(),
             gallery: super::gallery::measure(seed),
+            power: spectra_of(summary),
         }
+    }
+}
+
+impl Measurements {
+    /// The power spectra, which are drawn too.
+    pub(super) fn power(&self) -> &[SetPower] {
+        &self.power
     }
 }
 
@@ -110,6 +126,7 @@ pub fn report_with(summary: &Summary, figures: &Figures, measured: &Measurements
     pictures::stages(summary, figures, &mut page);
     points::figure_2(summary, figures, &mut page);
     points::discrepancy(summary, figures, &mut page);
+    spectra::section(summary, &measured.power, figures, &mut page);
     page.heading(2, "Independent or correlated");
     points::within(summary, tests, &mut page);
     in_step::between_decisions(summary, measured, &mut page);
@@ -119,7 +136,7 @@ pub fn report_with(summary: &Summary, figures: &Figures, measured: &Measurements
     identical::section(summary, &identity, &mut page);
     convergence::section(summary, figures, &mut page);
     convergence::bias_and_variance(summary, figures, &mut page);
-    prediction::section(summary, &mut page);
+    prediction::section(summary, figures, &mut page);
     pictures::strips(summary, figures, &mut page);
     speed::section(summary, figures, &mut page);
     shortcut::section(summary, &mut page);

@@ -153,7 +153,7 @@ fn at_equal_time(summary: &Summary, set: &PictureSet, figures: &Figures, page: &
     let (asked, figure) = (set.pictures.equal_spp(), of_scene("equal-time", scene));
     let counts: Vec<String> = set.pictures.spp.iter().map(u32::to_string).collect();
     let rule = format!(
-        "the budget is what {} takes at {asked} spp, {} s; of {} spp each sampler shows the count whose seconds come nearest, no more than {} above it (seconds: median of the replicates of {}, \
+        "the budget is what {} takes at {asked} spp, {} s; of {} spp each sampler shows the count whose seconds come nearest, no more than {} above it (seconds: medians of repeated timings at {}, \
          scaled by pixels, between their counts on a line of logarithms)",
         name(summary, uniform),
         short(found.budget),
@@ -201,7 +201,7 @@ fn load_words(found: &EqualTime) -> String {
         return String::new();
     }
     format!(
-        "**The machine had other work**: its load average was {low:.1} to {high:.1} while these pictures used {}. Medians of replicates bear that better than single timings do, but are rough too, so who has the smaller error in equal time \
+        "**The machine had other work**: its load average was {low:.1} to {high:.1} while these pictures used {}. Medians of repeated timings bear that better than single ones do, but are rough too, so who has the smaller error in equal time \
          is not said here.",
         counted(threads, "thread", "threads")
     )

@@ -6,8 +6,9 @@ use crate::stats::Estimate;
 use super::super::markdown::{Page, link_to, table_ref};
 use super::super::numbers::{counted, estimate, listed, percent, short};
 use super::super::summarise::Summary;
+use super::super::write::Figures;
 use super::words::{row, times};
-use super::{tabulate, tabulate_folded, titles};
+use super::{show, tabulate, tabulate_folded, titles};
 
 /// Measured and predicted variances within this factor of each other count as equal.
 const EQUAL: f64 = 1.25;
@@ -39,7 +40,7 @@ fn words(verdict: Verdict) -> String {
 }
 
 /// Predicted beside measured variances.
-pub fn section(summary: &Summary, page: &mut Page) {
+pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
     let Some(asked_for) = &summary.about.experiment.prediction else { return };
     page.heading(2, titles::PREDICTION);
     let found = &summary.predictions;
@@ -63,6 +64,11 @@ pub fn section(summary: &Summary, page: &mut Page) {
     );
     let head = ["sampler", "spp", "formula", "measured / predicted", "beyond the sum", "verdict", "row"];
     tabulate(page, "predicted", &caption, &head, &lines);
+    let caption = format!(
+        "Measured over predicted variance of single pixels (column, row) of `{}`, over {} randomisations, with the 95 % χ² interval of the measured one; 1: as predicted.",
+        asked_for.scene, asked_for.seeds
+    );
+    show(page, figures, "predicted-variance", true, &caption);
     page.sentences(&[stationary(found), others(found)]);
     pixel_table(found, page);
 }

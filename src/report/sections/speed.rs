@@ -4,13 +4,13 @@ use crate::stats::Estimate;
 
 use super::super::charts::of_scene;
 use super::super::evidence::ratio;
-use super::super::markdown::Page;
+use super::super::markdown::{Page, table_ref};
 use super::super::numbers::{counted, estimate, listed};
 use super::super::pareto::pareto_front;
 use super::super::summarise::{Cell, Speed, Summary};
 use super::super::write::Figures;
 use super::words::{marked_row, name, ratio_cell, scene_name};
-use super::{budgets, show, tabulate_folded, titles};
+use super::{budgets, reach, sampling, show, tabulate_folded, titles};
 
 /// The section.
 pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
@@ -19,29 +19,65 @@ pub fn section(summary: &Summary, figures: &Figures, page: &mut Page) {
         page.paragraph("Nothing was timed, so nothing is said of speed.");
         return;
     }
-    let images: usize = summary.speeds.iter().map(|speed| speed.images).sum();
-    let mut threads: Vec<String> = summary.speeds.iter().map(|speed| speed.threads.to_string()).collect();
-    threads.sort();
-    threads.dedup();
+    page.paragraph(&timed_words(summary));
     page.paragraph(&format!(
-        "Seconds are this machine's: {} timed on {} threads, wall seconds of rendering alone. Other work on the machine \
-         moves them; they are no part of `summary.csv`.",
-        counted(images, "image", "images"),
-        listed(&threads)
+        "How to read the figures: farther left is faster, farther down more accurate, both on scales where one step is one factor. A mark with no other mark both left of it and below it is on the *front*: nothing is better than it at both. Along a grey diagonal RMSE² · seconds stays the same: it is the way of independent samples, four times the seconds for half the error, so two marks on one diagonal are equally good, the same picture with more or fewer samples, and the next diagonal to the lower left needs a tenth of the seconds for the same error. A line of marks steeper than the diagonals gains more from each further second than independent samples do; one that levels off gains nothing. Boxes show how sure both numbers are: where boxes overlap, no difference can be told by the picture; {} and {} say what can.",
+        table_ref("budgets"),
+        table_ref("equal-seconds")
     ));
     budgets::section(summary, page);
+    reach::section(summary, page);
+    sampling::share(summary, page);
+    sampling::peers(summary, page);
     for scene in 0..summary.scenes.len() {
         let scene_file = &summary.scenes[scene].name;
         let caption = format!(
-            "Speed against accuracy in `{scene_file}`, {} pixels: median seconds an image against RMSE in W/(m² sr), one mark a sampler and count, those on the front with their samples per pixel; bars: range of \
-             the seconds and 95 % interval of the RMSE, {}.",
+            "Speed against accuracy in `{scene_file}`, {} pixels: median seconds an image against RMSE in W/(m² sr), one mark a sampler and count, those on the front with their samples per pixel; boxes: intervals of \
+             the median seconds and of the RMSE, {}; grey: equal RMSE² · seconds, a factor of 10 from line to line.{}",
             summary.scenes[scene].size,
-            counted(summary.about.experiment.replicates as usize, "replicate", "replicates")
+            counted(summary.about.experiment.replicates as usize, "replicate", "replicates"),
+            if sampling::peers_of(summary, scene).is_empty() { "" } else { " Stars: other programs." }
         );
         show(page, figures, &of_scene("speed", scene_file), true, &caption);
         page.sentences(&[front_sentence(summary, scene).unwrap_or_default()]);
         efficiency_table(summary, scene, page);
     }
+}
+
+/// Where the seconds come from.
+fn timed_words(summary: &Summary) -> String {
+    let all = |of: &dyn Fn(&Speed) -> String| {
+        let mut words: Vec<String> = summary.speeds.iter().map(of).collect();
+        words.sort();
+        words.dedup();
+        words
+    };
+    let threads = listed(&all(&|speed| speed.threads.to_string()));
+    let (rounds, replicates): (Vec<&Speed>, Vec<&Speed>) = summary.speeds.iter().partition(|s| s.is_in_rounds);
+    let range = |speeds: &[&Speed]| {
+        let (low, high) = speeds.iter().fold((usize::MAX, 0), |(l, h), s| (l.min(s.timings), h.max(s.timings)));
+        if low == high { low.to_string() } else { format!("{low} to {high}") }
+    };
+    let mut ways = Vec::new();
+    if !rounds.is_empty() {
+        ways.push(format!(
+            "medians of {} rounds ({}), each of which rendered one image of every scene, sampler and count again after all else was done, so that what else the machine did met all of them",
+            range(&rounds),
+            counted(rounds.len(), "case", "cases")
+        ));
+    }
+    if !replicates.is_empty() {
+        ways.push(format!(
+            "medians over {} replicates, each timed as it was made ({})",
+            range(&replicates),
+            counted(replicates.len(), "case", "cases")
+        ));
+    }
+    format!(
+        "Seconds are this machine's, on {threads} threads, wall seconds of rendering alone: {}. Their intervals lie between two of the timings themselves, whatever their distribution: of six and more at 95 %, of fewer their range. Other work on the machine \
+         moves them; they are no part of `summary.csv`.",
+        ways.join("; ")
+    )
 }
 
 /// Cells of a scene with a time and an error above 0.
@@ -131,8 +167,8 @@ fn efficiency_table(summary: &Summary, scene: usize, page: &mut Page) {
     ];
     let scene_file = &summary.scenes[scene].name;
     let caption = format!(
-        "Seconds an image of `{scene_file}` at {spp} spp and millions of samples per second, median and range; efficiency 1/(MSE · T) in 1/((W/(m² sr))² · thread-seconds), its interval \
-         from the range of T and the 95 % interval of the MSE; the same over uniform sampling's."
+        "Seconds an image of `{scene_file}` at {spp} spp and millions of samples per second, medians with their intervals; efficiency 1/(MSE · T) in 1/((W/(m² sr))² · thread-seconds), its interval \
+         from those of T and of the MSE; the same over uniform sampling's."
     );
     let key = of_scene("efficiency", scene_file);
     tabulate_folded(page, &key, &format!("Seconds and efficiency in {scene_file}"), &caption, &head, &lines);

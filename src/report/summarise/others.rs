@@ -2,10 +2,10 @@
 
 use std::collections::HashMap;
 
-use crate::experiment::results::{ImageRow, PointsRow, SceneFacts, Stage, Timing};
+use crate::experiment::results::{ImageRow, PointsRow, Rounds, SceneFacts, Stage, Timing};
 use crate::experiment::spec::Pictures;
 use crate::sampling::Decision;
-use crate::stats::{Estimate, slope_with_interval, t_interval};
+use crate::stats::{Estimate, median_interval, slope_with_interval, t_interval};
 
 use super::super::shots::{PictureSet, Shot};
 use super::{Cell, Index, PointSet, SLOPE_COUNTS, Slope, Speed, Summary};
@@ -99,12 +99,33 @@ impl Index<'_> {
             let (s, p) = (&summary.scenes[cell.scene], &summary.samplers[cell.sampler]);
             let members = self.plain(s, p, cell.spp.asked).into_iter().flat_map(|row| &row.members);
             let timed: Vec<&Timing> = members.filter_map(|id| by_id.get(id.as_str()).copied()).collect();
-            let Some(seconds) = median(timed.iter().map(|timing| timing.seconds).collect()) else { continue };
-            let threads = timed.iter().map(|timing| timing.threads).max().unwrap_or(1);
-            let Cell { scene, sampler, spp, .. } = *cell;
-            summary.speeds.push(Speed { scene, sampler, spp, seconds, images: timed.len(), threads });
+            summary.speeds.extend(speed(cell, &timed));
         }
     }
+}
+
+/// The seconds of one cell's images: of the rounds, where one of them was made again in rounds.
+fn speed(cell: &Cell, timed: &[&Timing]) -> Option<Speed> {
+    let Cell { scene, sampler, spp, .. } = *cell;
+    let rounds = timed.iter().find_map(|timing| timing.again.as_ref()).filter(|again| !again.seconds.is_empty());
+    let (all, threads, sampling) = match rounds {
+        Some(again) => (again.seconds.clone(), again.threads, sampling_share(again)),
+        None => {
+            let threads = timed.iter().map(|timing| timing.threads).max().unwrap_or(1);
+            (timed.iter().map(|timing| timing.seconds).collect(), threads, None)
+        }
+    };
+    let seconds = median_interval(&all, 0.95)?;
+    Some(Speed { scene, sampler, spp, seconds, timings: all.len(), is_in_rounds: rounds.is_some(), threads, sampling })
+}
+
+/// Seconds of the numbers over those of the image, round by round, so that what slows a round slows both.
+fn sampling_share(again: &Rounds) -> Option<Estimate> {
+    if again.numbers.len() != again.seconds.len() || again.seconds.iter().any(|&seconds| seconds <= 0.0) {
+        return None;
+    }
+    let shares: Vec<f64> = again.numbers.iter().zip(&again.seconds).map(|(numbers, all)| numbers / all).collect();
+    median_interval(&shares, 0.95)
 }
 
 fn point_set(sampler: usize, metric: &str, sets: &[&PointsRow], is_fixed: bool) -> PointSet {
@@ -116,14 +137,6 @@ fn point_set(sampler: usize, metric: &str, sets: &[&PointsRow], is_fixed: bool) 
     });
     let (n, id) = (sets[0].n, sets[0].id.clone());
     PointSet { sampler, n, metric: metric.to_owned(), mean, values, id }
-}
-
-/// The middle value with the range as its interval.
-fn median(mut values: Vec<f64>) -> Option<Estimate> {
-    values.sort_by(f64::total_cmp);
-    let (&low, &high) = (values.first()?, values.last()?);
-    let middle = (values[(values.len() - 1) / 2] + values[values.len() / 2]) / 2.0;
-    Some(Estimate { value: middle, ci95: (values.len() > 1).then_some([low, high]) })
 }
 
 /// Slopes of RMSE, by scene and sampler.
