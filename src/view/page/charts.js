@@ -70,7 +70,7 @@ export function spectrum(panels, reference) {
   }
   context.textAlign = "center";
   for (const f of [0, 0.25, 0.5, 0.707]) {
-    context.fillText(String(f), Math.min(x(f), width - 14), height - bottom + 15);
+    context.fillText(String(f), Math.min(x(f), width - 18), height - bottom + 15);
     context.fillRect(x(f), height - bottom, 1, 3);
   }
   context.fillText("cycles per pixel", (left + width) / 2, height - 4);
