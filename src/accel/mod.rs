@@ -154,3 +154,18 @@ fn cross(a: Vec3, b: Vec3) -> Vec3 {
 pub(crate) fn reciprocal_of(d: Vec3) -> Vec3 {
     Vec3::new(safe_reciprocal(d.x), safe_reciprocal(d.y), safe_reciprocal(d.z))
 }
+
+/// The one formula over all triangles, in order: what every kernel must find.
+#[cfg(test)]
+fn brute_force(triangles: &[Triangle], reach: f32, ray: &Ray, limit: f32) -> Option<Hit> {
+    let mut best: Option<Hit> = None;
+    for (i, triangle) in triangles.iter().enumerate() {
+        let bounds = triangle.bounds(box_padding(reach));
+        let (near, far) = slab(bounds.min, bounds.max, ray.origin, reciprocal_of(ray.direction));
+        let t = meet(&triangle.corners, near, far, ray.origin, ray.direction);
+        if t > 0.0 && t < best.map_or(limit, |b| b.t) {
+            best = Some(Hit { t, triangle: i as u32 });
+        }
+    }
+    best
+}

@@ -295,7 +295,7 @@ impl Accel {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Triangle, box_padding};
+    use super::super::{Triangle, brute_force};
     use super::*;
     use crate::sampling::hash::{bits64, unit_f32};
 
@@ -310,20 +310,6 @@ mod tests {
         fn vec3(&mut self) -> Vec3 {
             Vec3::new(self.signed(), self.signed(), self.signed())
         }
-    }
-
-    /// The one formula over all triangles, in order.
-    fn brute_force(triangles: &[Triangle], reach: f32, ray: &Ray, limit: f32) -> Option<Hit> {
-        let mut best: Option<Hit> = None;
-        for (i, triangle) in triangles.iter().enumerate() {
-            let bounds = triangle.bounds(box_padding(reach));
-            let (near, far) = slab(bounds.min, bounds.max, ray.origin, reciprocal_of(ray.direction));
-            let t = meet(&triangle.corners, near, far, ray.origin, ray.direction);
-            if t > 0.0 && t < best.map_or(limit, |b| b.t) {
-                best = Some(Hit { t, triangle: i as u32 });
-            }
-        }
-        best
     }
 
     fn agree(triangles: &[Triangle], reach: f32, rays: &[(Ray, f32)]) {

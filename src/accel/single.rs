@@ -178,22 +178,8 @@ fn test<const ANY: bool>(block: &Block8, pad: f32, way: &mut Way) {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::{Triangle, box_padding};
+    use super::super::{Triangle, box_padding, brute_force};
     use super::*;
-
-    /// The one formula over all triangles, in order.
-    fn brute_force(triangles: &[Triangle], reach: f32, ray: &Ray, limit: f32) -> Option<Hit> {
-        let mut best: Option<Hit> = None;
-        for (i, triangle) in triangles.iter().enumerate() {
-            let bounds = triangle.bounds(box_padding(reach));
-            let (near, far) = slab(bounds.min, bounds.max, ray.origin, reciprocal_of(ray.direction));
-            let t = meet(&triangle.corners, near, far, ray.origin, ray.direction);
-            if t > 0.0 && t < best.map_or(limit, |b| b.t) {
-                best = Some(Hit { t, triangle: i as u32 });
-            }
-        }
-        best
-    }
 
     /// Coordinates of a coarse lattice: shared edges, ties, triangles without area, rays along axes and through corners.
     fn lattice() -> impl Strategy<Value = Vec3> {

@@ -47,7 +47,13 @@ pub(super) fn trace<const ANY: bool>(tree: &Tree8, way: &mut Way) {
 /// The nearest of the children that are met; the others wait, the nearer on top where distances matter.
 #[inline]
 #[target_feature(enable = "avx2,bmi1")]
-fn descend<const ANY: bool>(tree: &Tree8, node: &Node8, near: __m256, mut met: u32, stack: &mut Stack) -> u32 {
+pub(super) fn descend<const ANY: bool>(
+    tree: &Tree8,
+    node: &Node8,
+    near: __m256,
+    mut met: u32,
+    stack: &mut Stack,
+) -> u32 {
     let near = array(near);
     let first = met.trailing_zeros() as usize % WIDTH;
     met &= met - 1;

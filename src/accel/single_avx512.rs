@@ -3,11 +3,12 @@
 use std::arch::x86_64::*;
 use std::mem::MaybeUninit;
 
-use super::nodes8::{LEAF, Node8, Tree8, WIDTH};
+use super::nodes8::{LEAF, Tree8};
 use super::packet::NOTHING;
 use super::single::Way;
-use super::stack::{FEW, Stack, waiting};
-use super::vector8::{Ray8, array, fetch};
+use super::single_avx2::descend;
+use super::stack::{FEW, Stack};
+use super::vector8::Ray8;
 
 /// Finds the nearest hit of a ray, or whether anything is hit.
 #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
@@ -42,33 +43,4 @@ pub(super) fn trace<const ANY: bool>(tree: &Tree8, way: &mut Way) {
             Some(next) => child = next,
         }
     }
-}
-
-/// The nearest of the children that are met; the others wait, the nearer on top where distances matter.
-#[inline]
-#[target_feature(enable = "avx512f,avx512vl,avx2,bmi1")]
-fn descend<const ANY: bool>(tree: &Tree8, node: &Node8, near: __m256, mut met: u32, stack: &mut Stack) -> u32 {
-    let near = array(near);
-    let first = met.trailing_zeros() as usize % WIDTH;
-    met &= met - 1;
-    if met == 0 {
-        return node.children[first];
-    }
-    fetch(tree, node.children[first]);
-    let mut nearest = waiting(near[first], node.children[first]);
-    let bottom = stack.len();
-    while met != 0 {
-        let k = met.trailing_zeros() as usize % WIDTH;
-        met &= met - 1;
-        fetch(tree, node.children[k]);
-        let entry = waiting(near[k], node.children[k]);
-        let farther = nearest.max(entry);
-        nearest = nearest.min(entry);
-        if ANY {
-            stack.push(farther);
-        } else {
-            stack.insert(farther, bottom);
-        }
-    }
-    nearest as u32
 }

@@ -269,7 +269,7 @@ impl Scene {
     ///
     /// While the tree is built a triangle takes 100 bytes of the mesh, 36 of corners, 32 of its box, and in the builder 4 of an index,
     /// 16 of keys to sort by, 96 of nodes that are merged and 96 of the tree's; and what was read of its file, some 40, may not be back
-    /// with the system yet: [`BUILD_BYTES`]. Later, tree and faces take less.
+    /// with the system yet: `BUILD_BYTES`. Later, tree and faces take less.
     pub fn most_bytes(mesh: &Mesh, pixels: u64) -> u64 {
         BUILD_BYTES * mesh.len() as u64
             + mesh.textures.iter().map(|texture| texture.bytes() as u64).sum::<u64>()

@@ -47,7 +47,7 @@ impl Told {
     }
 }
 
-/// Cuts the polygons of `faces`, a part of `obj`, into triangles. `normals` are the file's, brought to unit length by [`unit`].
+/// Cuts the polygons of `faces`, a part of `obj`, into triangles. `normals` are the file's, brought to unit length by [`unit()`].
 pub fn triangles(obj: &Obj, faces: &Faces, normals: &[Option<Vec3>]) -> Triangles {
     let mut made = Triangles::default();
     let count = faces.most_triangles();

@@ -14,6 +14,7 @@ use sampler_lab::scene::load;
 use sampler_lab::view::{Options, Server};
 use serde_json::{Value, json};
 
+use crate::accessibility::findings;
 use crate::chromium::{Browser, Page};
 
 /// A server of a small picture, and what ends it.
@@ -220,8 +221,8 @@ fn two_samplers_are_compared_and_flipped_and_the_page_fits_a_narrow_dark_window(
     let count = |f: &dyn Fn(&[u8]) -> bool| map.chunks(3).filter(|p| f(p)).count();
     assert!(count(&|p| p[0] > p[2]) > 20 && count(&|p| p[2] > p[0]) > 20, "brighter and darker pixels");
     page.key("1");
-    page.prefer("dark");
-    for width in [1000, 400] {
+    for (width, scheme) in [(1000, "light"), (400, "dark")] {
+        page.prefer(scheme);
         page.resize(width, 700);
         for panel in 0..9 {
             page.evaluate(&format!(
@@ -230,6 +231,7 @@ fn two_samplers_are_compared_and_flipped_and_the_page_fits_a_narrow_dark_window(
             page.settle();
             let overflow = page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth");
             assert_eq!(overflow, 0, "panel {panel} at {width} pixels");
+            assert_eq!(findings(&page), Vec::<String>::new(), "panel {panel} at {width} pixels");
         }
     }
     assert_eq!(page.errors(), Vec::<String>::new());
