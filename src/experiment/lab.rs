@@ -161,7 +161,7 @@ impl Lab {
             lens: full.focal_depth().is_some(),
             lights: full.lights.as_ref().map(|lights| lights.lights().len() as u32),
             exposure: framebuffer.exposure,
-            memory_bytes: SCENE_COPIES * full.bytes() as u64,
+            memory_bytes: SCENE_COPIES * Scene::most_bytes(&full.mesh, 0),
         };
         self.layouts.borrow_mut().insert(name.clone(), full.layout.clone());
         let compiled = HashMap::from([(Compiled::full(), full)]);
