@@ -5,84 +5,18 @@
 //! whose rays all run into one octant knows which planes of a box are the near ones.
 
 use std::arch::x86_64::*;
+use std::mem::MaybeUninit;
 
-use super::beam::{Beam, Bundle, MIXED};
+use super::beam::{Beam, MIXED};
 use super::build::Accel;
-use super::packet::{LANES, NOTHING, Packet, Row};
-use super::packet_tree::{Corners, PacketTree, Planes};
+use super::lone;
+use super::packet::{LANES, NOTHING, Packet};
+use super::packet_tree::{Corners, PacketNode, PacketTree, Planes, WIDTH};
+use super::single::Way;
+use super::stack::{FEW, Stack};
+use super::vector16::{Vec3x16, load, store};
 
-/// Three coordinates of 16 vectors.
-#[derive(Clone, Copy)]
-struct Vec3x16 {
-    x: __m512,
-    y: __m512,
-    z: __m512,
-}
-
-#[inline]
-#[target_feature(enable = "avx512f")]
-fn load(row: &Row) -> __m512 {
-    // SAFETY: a row is 16 floats, which is what is read.
-    #[allow(unsafe_code, reason = "the load takes a pointer")]
-    unsafe {
-        _mm512_loadu_ps(row.as_ptr())
-    }
-}
-
-#[inline]
-#[target_feature(enable = "avx512f")]
-fn store(row: &mut Row, values: __m512) {
-    // SAFETY: a row is 16 floats, which is what is written.
-    #[allow(unsafe_code, reason = "the store takes a pointer")]
-    unsafe {
-        _mm512_storeu_ps(row.as_mut_ptr(), values);
-    }
-}
-
-impl Vec3x16 {
-    #[inline]
-    #[target_feature(enable = "avx512f")]
-    fn load(rows: &[Row; 3]) -> Self {
-        Self { x: load(&rows[0]), y: load(&rows[1]), z: load(&rows[2]) }
-    }
-
-    #[inline]
-    #[target_feature(enable = "avx512f")]
-    fn splat(v: glam::Vec3) -> Self {
-        Self { x: _mm512_set1_ps(v.x), y: _mm512_set1_ps(v.y), z: _mm512_set1_ps(v.z) }
-    }
-
-    #[inline]
-    #[target_feature(enable = "avx512f")]
-    fn sub(self, b: Self) -> Self {
-        Self { x: _mm512_sub_ps(self.x, b.x), y: _mm512_sub_ps(self.y, b.y), z: _mm512_sub_ps(self.z, b.z) }
-    }
-
-    #[inline]
-    #[target_feature(enable = "avx512f")]
-    fn add(self, b: Self) -> Self {
-        Self { x: _mm512_add_ps(self.x, b.x), y: _mm512_add_ps(self.y, b.y), z: _mm512_add_ps(self.z, b.z) }
-    }
-
-    #[inline]
-    #[target_feature(enable = "avx512f")]
-    fn dot(self, b: Self) -> __m512 {
-        let xy = _mm512_add_ps(_mm512_mul_ps(self.x, b.x), _mm512_mul_ps(self.y, b.y));
-        _mm512_add_ps(xy, _mm512_mul_ps(self.z, b.z))
-    }
-
-    #[inline]
-    #[target_feature(enable = "avx512f")]
-    fn cross(self, b: Self) -> Self {
-        Self {
-            x: _mm512_sub_ps(_mm512_mul_ps(self.y, b.z), _mm512_mul_ps(self.z, b.y)),
-            y: _mm512_sub_ps(_mm512_mul_ps(self.z, b.x), _mm512_mul_ps(self.x, b.z)),
-            z: _mm512_sub_ps(_mm512_mul_ps(self.x, b.y), _mm512_mul_ps(self.y, b.x)),
-        }
-    }
-}
-
-/// The rays of a packet in registers.
+/// The rays of a packet in registers. Idle lanes repeat a ray that is not idle, for the beam's sake.
 struct Rays {
     origin: Vec3x16,
     direction: Vec3x16,
@@ -123,7 +57,9 @@ impl Rays {
         if inside == 0 {
             return false;
         }
-        let [a, b, c] = triangle.corners.map(|corner| Vec3x16::splat(corner).sub(self.origin));
+        let a = Vec3x16::splat(triangle.corner(0)).sub(self.origin);
+        let b = Vec3x16::splat(triangle.corner(1)).sub(self.origin);
+        let c = Vec3x16::splat(triangle.corner(2)).sub(self.origin);
         let (ca, ab, bc) = (c.sub(a), a.sub(b), b.sub(c));
         let u = ca.cross(c.add(a)).dot(self.direction);
         let v = ab.cross(a.add(b)).dot(self.direction);
@@ -166,23 +102,35 @@ impl Rays {
         }
     }
 
-    /// The rays that are not idle; at least one is not.
+    /// Tests the triangles at some places of a node, see [`Self::meet`].
     #[inline]
-    #[target_feature(enable = "avx512f")]
-    fn bundle(&self) -> Bundle {
-        let rows = |v: &Vec3x16| [v.x, v.y, v.z];
-        Bundle {
-            origin: rows(&self.origin),
-            direction: rows(&self.direction),
-            reciprocal: rows(&self.reciprocal),
-            live: self.live(),
+    #[target_feature(enable = "avx512f,bmi1")]
+    fn meet_some<const ANY: bool, const OCTANT: u8>(
+        &mut self,
+        tree: &PacketTree,
+        node: &PacketNode,
+        mut places: u32,
+    ) -> bool {
+        let mut changed = false;
+        while places != 0 {
+            let place = places.trailing_zeros() as usize % WIDTH;
+            places &= places - 1;
+            changed |= self.meet::<ANY, OCTANT>(&node.planes, place, &tree.triangles[node.children[place] as usize]);
         }
+        changed
     }
 
+    /// Of some places of a node those whose boxes a lane meets no farther than its limit.
     #[inline]
-    #[target_feature(enable = "avx512f")]
-    fn live(&self) -> u16 {
-        _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.limit, _mm512_set1_ps(f32::NEG_INFINITY))
+    #[target_feature(enable = "avx512f,bmi1")]
+    fn meet_inner<const OCTANT: u8>(&self, node: &PacketNode, places: u32) -> u32 {
+        let (mut left, mut met) = (places, 0);
+        while left != 0 {
+            let place = left.trailing_zeros() as usize % WIDTH;
+            left &= left - 1;
+            met |= u32::from(self.meets::<OCTANT>(&node.planes, place) != 0) << place;
+        }
+        met
     }
 
     /// The largest limit of all lanes.
@@ -209,40 +157,63 @@ fn axis<const OCTANT: u8, const AXIS: u8>(low: f32, high: f32, origin: __m512, r
     }
 }
 
-/// Which way all rays that are not idle run, or [`MIXED`].
+/// Which way all rays run, or [`MIXED`], and along how many axes they run both ways.
 #[inline]
 #[target_feature(enable = "avx512f,avx512dq")]
-fn octant(rays: &Rays) -> u8 {
-    let live = rays.live();
-    let mut octant = 0;
-    for (axis, r) in [rays.reciprocal.x, rays.reciprocal.y, rays.reciprocal.z].into_iter().enumerate() {
-        let negative = _mm512_movepi32_mask(_mm512_castps_si512(r)) & live;
-        match negative {
+fn octant(reciprocal: &Vec3x16) -> (u8, u32) {
+    let (mut octant, mut both) = (0, 0);
+    for (axis, row) in [(0, reciprocal.x), (1, reciprocal.y), (2, reciprocal.z)] {
+        match _mm512_movepi32_mask(_mm512_castps_si512(row)) {
             0 => {}
-            all if all == live => octant |= 1 << axis,
-            _ => return MIXED,
+            0xffff => octant |= 1 << axis,
+            _ => both += 1,
         }
     }
-    octant
+    (if both == 0 { octant } else { MIXED }, both)
 }
+
+/// Whether 16 rays have too little in common for a beam: they run through each other's octants, and the box around their directions has
+/// a diagonal longer than √2 times a direction.
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn spread(direction: &Vec3x16) -> bool {
+    let (mut diagonal, mut length) = (0.0, 0.0);
+    for row in [direction.x, direction.y, direction.z] {
+        let extent = _mm512_reduce_max_ps(row) - _mm512_reduce_min_ps(row);
+        diagonal += extent * extent;
+        length += _mm512_cvtss_f32(row) * _mm512_cvtss_f32(row);
+    }
+    diagonal > 2.0 * length
+}
+
+/// In a tree of so few nodes it takes longer to find out which rays go where than to take all of them everywhere.
+const FEW_NODES: usize = 32;
 
 /// Finds the nearest hits of a packet, or whether anything is hit.
 #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,bmi1,bmi2,lzcnt,popcnt")]
 pub(super) fn trace<const ANY: bool>(accel: &Accel, packet: &mut Packet) {
     let tree = accel.packet_tree();
+    let limit = load(packet.limits());
+    let live = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(limit, _mm512_set1_ps(f32::NEG_INFINITY));
+    if tree.nodes.is_empty() || live == 0 {
+        return;
+    }
+    let stand_in = _mm512_set1_epi32(live.trailing_zeros() as i32);
     let (origin, direction, reciprocal) = packet.rows();
     let mut rays = Rays {
-        origin: Vec3x16::load(origin),
-        direction: Vec3x16::load(direction),
-        reciprocal: Vec3x16::load(reciprocal),
-        limit: load(packet.limits()),
+        origin: Vec3x16::load(origin, live, stand_in),
+        direction: Vec3x16::load(direction, live, stand_in),
+        reciprocal: Vec3x16::load(reciprocal, live, stand_in),
+        limit,
         triangle: _mm512_set1_epi32(NOTHING as i32),
     };
-    if tree.nodes.is_empty() || rays.live() == 0 {
+    let (octant, both) = octant(&rays.reciprocal);
+    if both >= 2 && tree.nodes.len() > FEW_NODES && spread(&rays.direction) {
+        trace_alone::<ANY>(tree, packet, live);
         return;
     }
     let pad = accel.pad;
-    match octant(&rays) {
+    match octant {
         0 => traverse::<ANY, 0>(tree, pad, &mut rays),
         1 => traverse::<ANY, 1>(tree, pad, &mut rays),
         2 => traverse::<ANY, 2>(tree, pad, &mut rays),
@@ -258,6 +229,22 @@ pub(super) fn trace<const ANY: bool>(accel: &Accel, packet: &mut Packet) {
     *triangle = triangles(rays.triangle);
 }
 
+/// Traces the rays of the `live` lanes one by one.
+#[inline]
+#[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,bmi1,bmi2,lzcnt,popcnt")]
+fn trace_alone<const ANY: bool>(tree: &PacketTree, packet: &mut Packet, mut live: u16) {
+    while live != 0 {
+        let lane = live.trailing_zeros() as usize % LANES;
+        live &= live - 1;
+        let (origin, direction, reciprocal) = packet.lane(lane);
+        let mut way = Way { origin, direction, reciprocal, limit: packet.limits()[lane], triangle: NOTHING };
+        lone::trace::<ANY>(tree, &mut way);
+        let (limit, triangle) = packet.results();
+        limit[lane] = if ANY && way.triangle != NOTHING { f32::NEG_INFINITY } else { way.limit };
+        triangle[lane] = way.triangle;
+    }
+}
+
 #[inline]
 #[target_feature(enable = "avx512f")]
 fn triangles(ids: __m512i) -> [u32; LANES] {
@@ -270,67 +257,46 @@ fn triangles(ids: __m512i) -> [u32; LANES] {
     out
 }
 
-/// Nodes waiting on the way down, on the stack for all but degenerate trees.
-const WAITING: usize = 192;
+/// So few boxes of nodes that testing all rays against them takes longer than it spares.
+const FEW_BOXES: u32 = 2;
 
 #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,bmi1,bmi2,lzcnt,popcnt")]
 fn traverse<const ANY: bool, const OCTANT: u8>(tree: &PacketTree, pad: f32, rays: &mut Rays) {
-    let mut waiting = [(0u32, 0.0f32); WAITING];
-    let mut heap = Vec::new();
-    let waiting: &mut [(u32, f32)] = if tree.waiting <= WAITING {
-        &mut waiting
+    let mut few = [MaybeUninit::uninit(); FEW];
+    let mut many = Vec::new();
+    let mut stack = Stack::new(if tree.waiting <= FEW {
+        &mut few
     } else {
-        heap.resize(tree.waiting, (0, 0.0));
-        &mut heap
-    };
-    let beam = Beam::around::<OCTANT>(&rays.bundle(), pad);
+        many.resize(tree.waiting, MaybeUninit::uninit());
+        &mut many
+    });
+    let beam = Beam::around::<OCTANT>(&rays.origin, &rays.direction, &rays.reciprocal, pad);
     let mut end = beam.end(rays.farthest());
-    let mut count = 0;
-    let mut index = 0u32;
+    let is_large = tree.nodes.len() > FEW_NODES;
+    let mut index = 0;
     loop {
         let node = &tree.nodes[index as usize];
-        let (met, near) = beam.meets::<OCTANT>(&node.planes, end);
-        let mut triangles = met & node.triangles;
-        let mut changed = false;
-        while triangles != 0 {
-            let place = triangles.trailing_zeros() as usize;
-            triangles &= triangles - 1;
-            changed |= rays.meet::<ANY, OCTANT>(&node.planes, place, &tree.triangles[node.children[place] as usize]);
-        }
-        if changed {
+        let (near, mut met) = beam.meets::<OCTANT>(&node.planes, end);
+        if met & node.triangles != 0 && rays.meet_some::<ANY, OCTANT>(tree, node, met & node.triangles) {
             let limit = rays.farthest();
             if limit == f32::NEG_INFINITY {
                 return;
             }
             end = beam.end(limit);
+            met &= u32::from(_mm256_cmp_ps_mask::<_CMP_LE_OQ>(near, _mm256_set1_ps(end)));
         }
         let mut inner = met & node.used & !node.triangles;
-        let first = count;
-        while inner != 0 {
-            let place = inner.trailing_zeros() as usize;
-            inner &= inner - 1;
-            // Camera rays of a pixel are so close together that their beam is as good as they are.
-            if (ANY || OCTANT == MIXED) && rays.meets::<OCTANT>(&node.planes, place) == 0 {
-                continue;
-            }
-            // Farthest first, so that the nearest is taken next; the order cannot change the answer.
-            let mut at = count;
-            while at > first && waiting[at - 1].1 < near[place] {
-                waiting[at] = waiting[at - 1];
-                at -= 1;
-            }
-            waiting[at] = (node.children[place], near[place]);
-            count += 1;
+        // Camera rays of a pixel are so close together that their beam is as good as they are; shadow rays where they meet few boxes.
+        if is_large && (OCTANT == MIXED || (ANY && inner.count_ones() > FEW_BOXES)) {
+            inner = rays.meet_inner::<OCTANT>(node, inner);
         }
-        loop {
-            if count == 0 {
-                return;
+        index = if inner != 0 {
+            tree.descend::<ANY>(node, beam.all_since_start(near), inner, &mut stack)
+        } else {
+            match stack.next(beam.since_start(end)) {
+                None => return,
+                Some(next) => next,
             }
-            count -= 1;
-            if waiting[count].1 <= end {
-                break;
-            }
-        }
-        index = waiting[count].0;
+        };
     }
 }

@@ -13,6 +13,8 @@ mod avx512;
 #[cfg(target_arch = "x86_64")]
 mod beam;
 mod build;
+#[cfg(target_arch = "x86_64")]
+mod lone;
 mod nodes8;
 mod packet;
 mod packet_tree;
@@ -23,6 +25,8 @@ mod single_avx2;
 #[cfg(target_arch = "x86_64")]
 mod single_avx512;
 mod stack;
+#[cfg(target_arch = "x86_64")]
+mod vector16;
 #[cfg(target_arch = "x86_64")]
 mod vector8;
 mod wide;

@@ -126,7 +126,7 @@ impl Packet {
     }
 
     #[inline(always)]
-    fn lane(&self, l: usize) -> (Vec3, Vec3, Vec3) {
+    pub(super) fn lane(&self, l: usize) -> (Vec3, Vec3, Vec3) {
         let at = |a: &[[f32; LANES]; 3]| Vec3::new(a[0][l], a[1][l], a[2][l]);
         (at(&self.origin), at(&self.direction), at(&self.reciprocal))
     }

@@ -4,8 +4,8 @@ use std::collections::BinaryHeap;
 
 use glam::Vec3;
 
-use super::Bounds;
 use super::build::{Accel, Child, Slot};
+use super::{Bounds, pages};
 
 /// Places in a node.
 pub(super) const WIDTH: usize = 8;
@@ -31,8 +31,20 @@ pub(super) struct PacketNode {
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub(super) struct Corners {
-    pub corners: [Vec3; 3],
+    /// By axis.
+    corners: [[f32; 3]; 3],
     pub id: u32,
+}
+
+impl Corners {
+    fn new(slot: &Slot) -> Self {
+        Self { corners: [0, 1, 2].map(|axis: usize| slot.corners.map(|corner| corner[axis])), id: slot.id }
+    }
+
+    #[inline(always)]
+    pub fn corner(&self, corner: usize) -> Vec3 {
+        Vec3::new(self.corners[0][corner], self.corners[1][corner], self.corners[2][corner])
+    }
 }
 
 /// Nodes, the root first, and triangles in the order of the tree.
@@ -96,7 +108,7 @@ impl PacketTree {
     /// Collapses the binary tree: of a node's parts the one with the largest box is opened as long as there is room. A subtree
     /// of at most eight triangles becomes these triangles at once.
     pub fn new(accel: &Accel) -> Self {
-        let mut tree = Self { nodes: Vec::new(), triangles: Vec::with_capacity(accel.slots.len()), waiting: 0 };
+        let mut tree = Self { nodes: Vec::new(), triangles: pages::with_capacity(accel.slots.len()), waiting: 0 };
         if accel.nodes.is_empty() {
             return tree;
         }
@@ -110,7 +122,7 @@ impl PacketTree {
             for slot in slots {
                 let place = tree.triangles.len();
                 tree.nodes[at].put(&slot.bounds, place, true);
-                tree.triangles.push(Corners { corners: slot.corners, id: slot.id });
+                tree.triangles.push(Corners::new(slot));
             }
             for part in nodes {
                 // Siblings stand side by side.
@@ -120,6 +132,7 @@ impl PacketTree {
                 tree.nodes.push(PacketNode::EMPTY);
             }
         }
+        tree.nodes = pages::moved(tree.nodes);
         tree
     }
 

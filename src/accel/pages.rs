@@ -10,6 +10,13 @@ pub(super) fn with_capacity<T>(count: usize) -> Vec<T> {
     vector
 }
 
+/// The same elements in a vector of their number, on such pages.
+pub(super) fn moved<T: Copy>(elements: Vec<T>) -> Vec<T> {
+    let mut vector = with_capacity(elements.len());
+    vector.extend_from_slice(&elements);
+    vector
+}
+
 #[cfg(all(target_os = "linux", not(miri)))]
 fn advise<T>(vector: &Vec<T>) {
     const PAGE: usize = 2 << 20;
