@@ -30,3 +30,13 @@ fn each<T: Copy, U: Copy + Default, const N: usize>(from: &[T; N], f: impl Fn(T)
     }
     to
 }
+
+/// `first` and the indices after it, where `first` may lie less than N below 0 (modulo 2³²): 0 in place of what is below it.
+#[inline(always)]
+fn row<const N: usize>(first: u32) -> [u32; N] {
+    let mut row = [0; N];
+    for (lane, index) in (0..).zip(&mut row) {
+        *index = (first.wrapping_add(lane) as i32).max(0) as u32;
+    }
+    row
+}
