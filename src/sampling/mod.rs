@@ -40,3 +40,24 @@ fn row<const N: usize>(first: u32) -> [u32; N] {
     }
     row
 }
+
+/// Lanes in a row.
+const ROW: usize = 16;
+
+/// Masks that begin in a lane: no bits, then all bits. To be read from a table, as choices that depend on a lane's number
+/// become branches or a patchwork of small vectors.
+static STEP: [u32; 2 * ROW] = {
+    let mut step = [0; 2 * ROW];
+    let mut i = ROW;
+    while i < step.len() {
+        step[i] = u32::MAX;
+        i += 1;
+    }
+    step
+};
+
+/// All bits from lane `first` ≤ [`ROW`] on, none before it.
+#[inline(always)]
+fn mask_from(first: usize) -> &'static [u32; ROW] {
+    STEP[ROW - first..][..ROW].try_into().expect("a row")
+}

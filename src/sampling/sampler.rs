@@ -9,10 +9,10 @@ use super::hash::{Permutation, bits32, derive, mix64, unit_f32};
 use super::layout::{Claim, Decision, Dim1, Dim2, SampleLayout};
 use super::radical::{PRIMES, radical_inverse_f64};
 use super::set::{SamplerSet, sheet_1d};
-use super::sobol::{self, SobolAxis, owen_scramble};
+use super::sobol::{SobolAxis, owen_scramble};
 use super::spec::{MAX_SAMPLES, Order, Points, Random, SamplerSpec, Scope};
 use super::strata::{factor_pair, in_stratum_f64, stratum_fraction};
-use super::{each, row};
+use super::{ROW, each, mask_from, row};
 use crate::error::{Error, Result};
 use crate::mutants::{Mutant, planted, wrong};
 
@@ -245,20 +245,17 @@ fn put_units(out: &mut [f32; BLOCK], lanes: Range<usize>, fractions: &[u32; BLOC
 }
 
 /// All bits in these lanes, none in the others.
-///
-/// From signs: of choices that depend on a lane's number the compiler would make branches.
 #[inline(always)]
 fn mask(lanes: &Range<usize>) -> [u32; BLOCK] {
-    let (start, end) = (lanes.start as i32, lanes.end as i32);
     let mut mask = [0; BLOCK];
-    for (lane, mask) in (0i32..).zip(&mut mask) {
-        *mask = (((lane - end) >> 31) & !((lane - start) >> 31)) as u32;
+    for (mask, (from, after)) in mask.iter_mut().zip(mask_from(lanes.start).iter().zip(mask_from(lanes.end))) {
+        *mask = from & !after;
     }
     mask
 }
 
 /// Indices looked up at once: what stays the same along a span is decided once a block.
-pub const BLOCK: usize = sobol::RUN;
+pub const BLOCK: usize = ROW;
 
 /// One decision's numbers: the specification made ready.
 #[derive(Debug, Clone)]

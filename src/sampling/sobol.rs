@@ -1,6 +1,6 @@
 //! Sobol' sequences, the (0,2)-sequence among them, and their scrambles: digital shift and nested uniform (Owen).
 
-use super::each;
+use super::{ROW, each, mask_from};
 
 /// Direction numbers of Joe & Kuo (2008), doi:10.1137/070709359, criterion D(6), dimensions 2 to 256, under their notice:
 /// lines that begin with `#`.
@@ -19,7 +19,7 @@ pub struct SobolAxis {
 }
 
 /// Consecutive indices looked up at once.
-pub const RUN: usize = 16;
+pub const RUN: usize = ROW;
 
 impl SobolAxis {
     /// Coordinate number `dimension` (0 is van der Corput's), or `None` beyond the table's [`DIMENSIONS`].
@@ -55,10 +55,8 @@ impl SobolAxis {
         let begin = (first - row) as usize;
         let low: &[u32; RUN] = self.low[begin..][..RUN].try_into().expect("a row");
         let mut out = [0; RUN];
-        for (lane, (out, low)) in (begin as i32..).zip(out.iter_mut().zip(low)) {
-            // All bits where the lane belongs to the first row: from a sign, as choices would become branches.
-            let in_first = ((lane - RUN as i32) >> 31) as u32;
-            *out = low ^ next ^ ((here ^ next) & in_first);
+        for ((out, low), in_next) in out.iter_mut().zip(low).zip(mask_from(RUN - begin)) {
+            *out = low ^ here ^ ((here ^ next) & in_next);
         }
         out
     }

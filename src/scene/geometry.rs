@@ -201,8 +201,9 @@ impl SurfaceRows {
         let rows = self.transpose(faces, triangles);
         for lane in 0..LANES {
             let ray = Ray { origin: column(origin, lane), direction: column(direction, lane) };
-            let corners = [0, 1, 2].map(|c| column(&rows.corners[c], lane));
-            let normals = [0, 1, 2].map(|c| column(&rows.normals[c], lane));
+            let ([c0, c1, c2], [n0, n1, n2]) = (&rows.corners, &rows.normals);
+            let corners = [column(c0, lane), column(c1, lane), column(c2, lane)];
+            let normals = [column(n0, lane), column(n1, lane), column(n2, lane)];
             self.put(lane, &corners, &normals, column(&self.face_normal, lane), &ray);
         }
     }
@@ -211,7 +212,11 @@ impl SurfaceRows {
     #[inline(always)]
     fn transpose(&mut self, faces: &[Face], triangles: &[u32; LANES]) -> FaceRows {
         let first = &faces[triangles[0] as usize];
-        let mut rows = FaceRows { corners: first.corners.map(splat), normals: first.normals.map(splat) };
+        let ([c0, c1, c2], [n0, n1, n2]) = (first.corners, first.normals);
+        let mut rows = FaceRows {
+            corners: [splat(c0), splat(c1), splat(c2)],
+            normals: [splat(n0), splat(n1), splat(n2)],
+        };
         self.face_normal = splat(first.face_normal);
         let mut left = *triangles;
         take(&mut left, triangles[0]);
@@ -266,7 +271,7 @@ impl SurfaceRows {
 #[inline(always)]
 fn barycentric(corners: &[Vec3; 3], ray: &Ray) -> Vec3 {
     let d = ray.direction;
-    let [a, b, c] = corners.map(|p| p - ray.origin);
+    let (a, b, c) = (corners[0] - ray.origin, corners[1] - ray.origin, corners[2] - ray.origin);
     let w1 = (c - a).cross(c + a).dot(d);
     let w2 = (a - b).cross(a + b).dot(d);
     let w0 = (b - c).cross(b + c).dot(d);
