@@ -39,6 +39,16 @@ pub struct Packet {
     triangle: [u32; LANES],
 }
 
+/// [`safe_reciprocal`] of every lane.
+#[inline(always)]
+fn reciprocals(row: &Row) -> Row {
+    let mut out = [0.0; LANES];
+    for lane in 0..LANES {
+        out[lane] = safe_reciprocal(row[lane]);
+    }
+    out
+}
+
 /// No triangle.
 pub const NOTHING: u32 = u32::MAX;
 
@@ -80,13 +90,36 @@ impl Packet {
     pub fn set_all(&mut self, origin: &[Row; 3], direction: &[Row; 3], limit: &Row) {
         self.origin = *origin;
         self.direction = *direction;
-        for axis in 0..3 {
-            for lane in 0..LANES {
-                self.reciprocal[axis][lane] = safe_reciprocal(direction[axis][lane]);
-            }
-        }
+        self.ready(limit);
+    }
+
+    /// Puts a ray into a lane of a packet that [`Self::ready`] then gets ready.
+    #[inline(always)]
+    pub fn put(&mut self, lane: usize, ray: &Ray) {
+        set_column(&mut self.origin, lane, ray.origin);
+        set_column(&mut self.direction, lane, ray.direction);
+    }
+
+    /// Begins with the rays that were put in: hits count at 0 < t < `limit`, and a lane whose limit is −∞ is idle.
+    #[inline(always)]
+    pub fn ready(&mut self, limit: &Row) {
+        // Not a loop over axes: that is the one which the compiler would make vectors of, of three numbers each.
+        let [x, y, z] = &self.direction;
+        self.reciprocal = [reciprocals(x), reciprocals(y), reciprocals(z)];
         self.limit = *limit;
         self.triangle = [NOTHING; LANES];
+    }
+
+    /// Where the rays start.
+    #[inline(always)]
+    pub fn origins(&self) -> &[Row; 3] {
+        &self.origin
+    }
+
+    /// Where they go.
+    #[inline(always)]
+    pub fn directions(&self) -> &[Row; 3] {
+        &self.direction
     }
 
     /// The triangle that each lane's ray met, [`NOTHING`] where none, after [`Accel::closest`] or [`Accel::occluded`].

@@ -7,12 +7,12 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::accel::{LANES, NOTHING, Packet, Ray, Row, column, set_column};
+use crate::accel::{LANES, NOTHING, Packet, Row, column, set_column};
 use crate::mutants::{Mutant, planted};
 use crate::sampling::{Dim2, PixelKey, PointSource};
 use crate::scene::camera::{Aperture, PixelSample};
 use crate::scene::compile::Scene;
-use crate::scene::geometry::SurfaceRows;
+use crate::scene::geometry::{SurfaceRows, put_one_where, put_where, take};
 use crate::scene::light::{LightPoint, LightSet, Parallelogram};
 
 use super::direct::{arrival, choose};
@@ -41,13 +41,11 @@ pub(super) struct Lanes {
     pick: Row,
     light: [Row; 2],
     /// The camera rays.
-    origin: [Row; 3],
-    direction: [Row; 3],
     view: Packet,
     surfaces: SurfaceRows,
     albedo: [Row; 3],
-    shadow_origin: [Row; 3],
-    shadow_direction: [Row; 3],
+    /// Whether the surface emits: 1 or 0.
+    emitter: [u32; LANES],
     shadow: Packet,
     pub radiance: [Row; 3],
     used: usize,
@@ -62,13 +60,10 @@ impl Default for Lanes {
             lens: two,
             pick: [0.0; LANES],
             light: two,
-            origin: three,
-            direction: three,
             view: Packet::default(),
             surfaces: SurfaceRows::default(),
             albedo: three,
-            shadow_origin: three,
-            shadow_direction: three,
+            emitter: [0; LANES],
             shadow: Packet::default(),
             radiance: three,
             used: 0,
@@ -110,13 +105,13 @@ impl Lanes {
             let lanes = span.lane..span.lane + span.count;
             let planes: [(Option<&Dim2>, &mut [Row; 2]); 3] =
                 [(pixel, &mut self.pixel), (lens, &mut self.lens), (light, &mut self.light)];
-            for (dim, [x, y]) in planes {
+            for (dim, rows) in planes {
                 if let Some(dim) = dim {
-                    source.fill_2d(key, span.first, dim, &mut x[lanes.clone()], &mut y[lanes.clone()]);
+                    source.fill_lanes_2d(key, span.first, dim, lanes.clone(), rows.each_mut());
                 }
             }
             if let Some(dim) = pick {
-                source.fill_1d(key, span.first, dim, &mut self.pick[lanes]);
+                source.fill_lanes_1d(key, span.first, dim, lanes, &mut self.pick);
             }
         }
     }
@@ -126,8 +121,13 @@ impl Lanes {
     fn aim(&mut self, scene: &Scene, spans: &[Span]) {
         let (mut x, mut y, mut limit) = ([0.0; LANES], [0.0; LANES], [IDLE; LANES]);
         for span in spans {
-            for lane in span.lane..span.lane + span.count {
-                (x[lane], y[lane], limit[lane]) = (span.x as f32, span.y as f32, f32::INFINITY);
+            let (column, row) = (span.x as f32, span.y as f32);
+            for lane in 0..LANES {
+                let own = (lane as u32).wrapping_sub(span.lane as u32) < span.count as u32;
+                let old = (x[lane], y[lane], limit[lane]);
+                x[lane] = if own { column } else { old.0 };
+                y[lane] = if own { row } else { old.1 };
+                limit[lane] = if own { f32::INFINITY } else { old.2 };
             }
         }
         let camera = &scene.camera;
@@ -135,21 +135,17 @@ impl Lanes {
         match &camera.aperture {
             Aperture::Pinhole => {
                 for lane in 0..LANES {
-                    let ray = camera.pinhole_ray(at(lane));
-                    set_column(&mut self.origin, lane, ray.origin);
-                    set_column(&mut self.direction, lane, ray.direction);
+                    self.view.put(lane, &camera.pinhole_ray(at(lane)));
                 }
             }
             Aperture::ThinLens { radius, focal_depth, .. } => {
                 for lane in 0..LANES {
                     let u = Vec2::new(self.lens[0][lane], self.lens[1][lane]);
-                    let ray = camera.lens_ray(at(lane), u, *radius, *focal_depth);
-                    set_column(&mut self.origin, lane, ray.origin);
-                    set_column(&mut self.direction, lane, ray.direction);
+                    self.view.put(lane, &camera.lens_ray(at(lane), u, *radius, *focal_depth));
                 }
             }
         }
-        self.view.set_all(&self.origin, &self.direction, &limit);
+        self.view.ready(&limit);
     }
 
     /// What the camera rays see: emitters, surfaces under the light they chose, or albedo alone.
@@ -157,26 +153,31 @@ impl Lanes {
     fn shade(&mut self, scene: &Scene) {
         self.radiance = [[0.0; LANES]; 3];
         let mut triangles = *self.view.triangles();
-        let hit = triangles.map(|t| t != NOTHING);
-        let Some(&some) = triangles.iter().find(|&&t| t != NOTHING) else { return };
+        let mut hit = [false; LANES];
+        let some = triangles.iter().fold(NOTHING, |least, &t| least.min(t));
+        if some == NOTHING {
+            return;
+        }
         // Lanes that met nothing work on another's triangle; nothing comes of it.
         for lane in 0..LANES {
-            triangles[lane] = if hit[lane] { triangles[lane] } else { some };
+            let own = triangles[lane];
+            hit[lane] = own != NOTHING;
+            triangles[lane] = if own == NOTHING { some } else { own };
         }
-        self.surfaces.fill(&scene.faces, &triangles, &self.origin, &self.direction);
-        self.look_at_materials(scene, &triangles, &hit);
+        self.surfaces.fill(&scene.faces, &triangles, self.view.origins(), self.view.directions());
+        let emits = self.look_at_materials(scene, &triangles, &hit);
         let Some(lights) = &scene.lights else {
             for c in 0..3 {
                 for lane in 0..LANES {
-                    self.radiance[c][lane] = if hit[lane] { self.albedo[c][lane] } else { 0.0 };
+                    let albedo = self.albedo[c][lane];
+                    self.radiance[c][lane] = if hit[lane] { albedo } else { 0.0 };
                 }
             }
             return;
         };
-        let is_emitter = self.surfaces.material.map(|m| scene.mesh.materials[m as usize].is_emitter);
         let mut open = [0u32; LANES];
         for lane in 0..LANES {
-            open[lane] = u32::from(hit[lane] & !is_emitter[lane]);
+            open[lane] = u32::from(hit[lane] & (self.emitter[lane] == 0));
         }
         let count = match lights {
             LightSet::Dark => 0,
@@ -192,33 +193,57 @@ impl Lanes {
             let stopped = self.shadow.triangles();
             for c in 0..3 {
                 for lane in 0..LANES {
-                    self.radiance[c][lane] = if stopped[lane] == NOTHING { self.radiance[c][lane] } else { 0.0 };
+                    let unshadowed = self.radiance[c][lane];
+                    self.radiance[c][lane] = if stopped[lane] == NOTHING { unshadowed } else { 0.0 };
                 }
             }
         }
-        if is_emitter.contains(&true) {
-            for lane in (0..LANES).filter(|&lane| hit[lane] & is_emitter[lane]) {
+        if emits {
+            for lane in 0..LANES {
+                if !hit[lane] | (self.emitter[lane] == 0) {
+                    continue;
+                }
                 let material = self.surfaces.material[lane];
                 set_column(&mut self.radiance, lane, scene.mesh.materials[material as usize].emission);
             }
         }
     }
 
-    /// Looks up albedos, with their textures.
+    /// Looks up albedos, with their textures, and which surfaces emit; whether any does.
+    ///
+    /// One material after the other: a packet rarely meets more than a few.
     #[inline(always)]
-    fn look_at_materials(&mut self, scene: &Scene, triangles: &[u32; LANES], hit: &[bool; LANES]) {
+    fn look_at_materials(&mut self, scene: &Scene, triangles: &[u32; LANES], hit: &[bool; LANES]) -> bool {
+        let mut left = self.surfaces.material;
+        let (mut emits, mut textured) = (false, false);
+        loop {
+            let next = left.iter().fold(NOTHING, |least, &m| least.min(m));
+            if next == NOTHING {
+                break;
+            }
+            let material = &scene.mesh.materials[next as usize];
+            put_where(&mut self.albedo, &left, next, material.albedo);
+            put_one_where(&mut self.emitter, &left, next, u32::from(material.is_emitter));
+            emits |= material.is_emitter;
+            textured |= material.texture.is_some();
+            take(&mut left, next);
+        }
+        if textured {
+            self.look_at_textures(scene, triangles, hit);
+        }
+        emits
+    }
+
+    #[inline(always)]
+    fn look_at_textures(&mut self, scene: &Scene, triangles: &[u32; LANES], hit: &[bool; LANES]) {
         for lane in 0..LANES {
             let material = &scene.mesh.materials[self.surfaces.material[lane] as usize];
-            let albedo = match material.texture {
-                None => material.albedo,
-                // What a lane that met nothing stands in for needs no look-up.
-                Some(_) if !hit[lane] => material.albedo,
-                Some(texture) => {
-                    let uv = self.surfaces.uv(&scene.faces[triangles[lane] as usize], lane);
-                    material.albedo * scene.mesh.textures[texture as usize].sample(uv)
-                }
-            };
-            set_column(&mut self.albedo, lane, albedo);
+            // What a lane that met nothing stands in for needs no look-up.
+            if let (Some(texture), true) = (material.texture, hit[lane]) {
+                let uv = self.surfaces.uv(&scene.faces[triangles[lane] as usize], lane);
+                let texel = scene.mesh.textures[texture as usize].sample(uv);
+                set_column(&mut self.albedo, lane, material.albedo * texel);
+            }
         }
     }
 
@@ -233,7 +258,7 @@ impl Lanes {
             limit[lane] = if lit { shadow_end() } else { IDLE };
             count += u32::from(lit);
         }
-        self.shadow.set_all(&self.shadow_origin, &self.shadow_direction, &limit);
+        self.shadow.ready(&limit);
         count
     }
 
@@ -259,7 +284,7 @@ impl Lanes {
             limit[lane] = if lit { shadow_end() } else { IDLE };
             count += u32::from(lit);
         }
-        self.shadow.set_all(&self.shadow_origin, &self.shadow_direction, &limit);
+        self.shadow.ready(&limit);
         count
     }
 
@@ -281,9 +306,7 @@ impl Lanes {
             let c = if planted(Mutant::SampleClamped) { c.min(1.0) } else { c };
             row[lane] = if lit { c } else { 0.0 };
         }
-        let Ray { origin, direction } = arrival.shadow_ray;
-        set_column(&mut self.shadow_origin, lane, origin);
-        set_column(&mut self.shadow_direction, lane, direction);
+        self.shadow.put(lane, &arrival.shadow_ray);
         lit
     }
 }

@@ -1,5 +1,8 @@
 //! Pixels over threads: spans of consecutive samples fill packets of rays; each tile writes only its own pixels.
 
+#![allow(clippy::needless_range_loop, reason = "a lane is a column of several rows at once")]
+
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::Vec3;
@@ -178,16 +181,51 @@ impl<S: PointSource> Wide for Tile<'_, S> {
 /// Adds the samples of `spans` to their pixels' sums, in the order of the indices.
 #[inline(always)]
 fn add(radiance: &[Row; 3], spans: &[Span], sums: &mut [[f64; 3]]) -> Result<(), NonFinite> {
+    // Magnitudes are in the order of their bits, what is no finite number above all others.
+    let mut largest = 0;
+    let mut wide = [[0.0f64; LANES]; 3];
+    for (row, wide) in radiance.iter().zip(&mut wide) {
+        for lane in 0..LANES {
+            largest = largest.max(row[lane].to_bits() & 0x7fff_ffff);
+            wide[lane] = f64::from(row[lane]);
+        }
+    }
+    if largest == 0 {
+        return Ok(());
+    }
+    if largest >= f32::INFINITY.to_bits() {
+        spans.iter().try_for_each(|span| check(radiance, span))?;
+    }
     for span in spans {
         let sum = &mut sums[span.pixel];
-        for (index, lane) in (span.first..).zip(span.lane..span.lane + span.count) {
-            let radiance = column(radiance, lane);
-            if !radiance.is_finite() {
-                return Err(NonFinite { x: span.x, y: span.y, index, radiance });
-            }
-            for (sum, c) in sum.iter_mut().zip(radiance.to_array()) {
-                *sum += f64::from(c);
-            }
+        if span.count == LANES {
+            add_lanes(sum, &wide, 0..LANES);
+        } else {
+            add_lanes(sum, &wide, span.lane..span.lane + span.count);
+        }
+    }
+    Ok(())
+}
+
+/// Adds samples to a sum, one after the other.
+#[inline(always)]
+fn add_lanes(sum: &mut [f64; 3], radiance: &[[f64; LANES]; 3], lanes: Range<usize>) {
+    let mut so_far = *sum;
+    for lane in lanes {
+        for (sum, row) in so_far.iter_mut().zip(radiance) {
+            *sum += row[lane];
+        }
+    }
+    *sum = so_far;
+}
+
+/// Whether a span's samples are finite.
+#[cold]
+fn check(radiance: &[Row; 3], span: &Span) -> Result<(), NonFinite> {
+    for (index, lane) in (span.first..).zip(span.lane..span.lane + span.count) {
+        let radiance = column(radiance, lane);
+        if !radiance.is_finite() {
+            return Err(NonFinite { x: span.x, y: span.y, index, radiance });
         }
     }
     Ok(())

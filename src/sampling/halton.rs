@@ -1,7 +1,7 @@
 //! Halton's axes made ready: radical inverses from tables, and nested random digit permutations.
 
 use super::divisor::Divisor;
-use super::each;
+use super::{each, row};
 use super::hash::bits64;
 use super::radical::{digit_count, is_in_single, mirrored, radical_inverse};
 use crate::mutants::{Mutant, planted};
@@ -39,14 +39,28 @@ impl HaltonAxis {
     }
 
     /// [`radical_inverse`] of several indices below n at once.
-    ///
-    /// Of consecutive indices that begin below n, those that follow may lie beyond: what is found for them means nothing.
     #[inline(always)]
     pub fn radical_inverses<const N: usize>(&self, indices: &[u32; N]) -> [u32; N] {
         if self.base == 2 || is_in_single() {
             return each(indices, |index| radical_inverse(self.base, index));
         }
-        if is_run(indices) { self.blocks.run(indices[0]) } else { self.blocks.any(indices) }
+        self.blocks.any(indices)
+    }
+
+    /// [`radical_inverse`] of `first` and the indices after it. `first` may lie less than N below 0 (modulo 2³²): what is found for
+    /// indices outside 0..n means nothing.
+    #[inline(always)]
+    pub fn run<const N: usize>(&self, first: u32) -> [u32; N] {
+        if self.base == 2 || is_in_single() {
+            return each(&row(first), |index| radical_inverse(self.base, index));
+        }
+        if first as i32 >= 0 {
+            return self.blocks.run(first);
+        }
+        let (mut out, before) = ([0; N], first.wrapping_neg() as usize);
+        let run: [u32; N] = self.blocks.run(0);
+        out[before..].copy_from_slice(&run[..N - before]);
+        out
     }
 
     /// Halton coordinates under nested random digit permutations, as 32-bit fractions (Owen 1995, doi:10.1007/978-1-4612-2552-2_19).
@@ -90,12 +104,6 @@ impl HaltonAxis {
         }
         fractions
     }
-}
-
-/// Whether each index follows the one before.
-#[inline(always)]
-fn is_run<const N: usize>(indices: &[u32; N]) -> bool {
-    (0..).zip(indices).fold(true, |run, (lane, &i)| run & (i == indices[0].wrapping_add(lane)))
 }
 
 /// Quotients by a base or a power of it, by multiplication.
@@ -288,6 +296,12 @@ mod tests {
                     for first in [indices[2], before % n, n.saturating_sub(1 + (round % 16) as u32)] {
                         check(&axis, digits, std::array::from_fn(|l| first + l as u32), n, key);
                     }
+                    // And before the first index.
+                    let before = (round % LANES as u64) as u32;
+                    let found: [u32; LANES] = axis.run(before.wrapping_neg());
+                    for (i, found) in (0..n).zip(&found[before as usize..]) {
+                        assert_eq!(*found, radical_inverse(base, i), "base {base}, {i} of {n} after {before}");
+                    }
                 }
             }
         }
@@ -295,7 +309,9 @@ mod tests {
 
     /// Every index below n has its value.
     fn check(axis: &HaltonAxis, digits: u32, indices: [u32; LANES], n: u32, key: u64) {
-        let (plain, scrambled) = (axis.radical_inverses(&indices), axis.digit_scrambled(&indices, key));
+        let is_run = indices.windows(2).all(|w| w[1] == w[0] + 1);
+        let plain = if is_run { axis.run(indices[0]) } else { axis.radical_inverses(&indices) };
+        let scrambled = axis.digit_scrambled(&indices, key);
         for (lane, i) in indices.into_iter().enumerate().filter(|(_, i)| *i < n) {
             let base = axis.base();
             assert_eq!(plain[lane], radical_inverse(base, i), "base {base}, {i} of {n}");

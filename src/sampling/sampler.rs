@@ -1,9 +1,9 @@
 //! Samplers at work: a number is a pure function of (seed, pixel, sample index, dimension).
 
 use std::hint::black_box;
+use std::ops::Range;
 
 use super::divisor::Divisor;
-use super::each;
 use super::halton::HaltonAxis;
 use super::hash::{Permutation, bits32, derive, mix64, unit_f32};
 use super::layout::{Claim, Decision, Dim1, Dim2, SampleLayout};
@@ -12,6 +12,7 @@ use super::set::{SamplerSet, sheet_1d};
 use super::sobol::{SobolAxis, owen_scramble};
 use super::spec::{MAX_SAMPLES, Order, Points, Random, SamplerSpec, Scope};
 use super::strata::{factor_pair, in_stratum_f64, stratum_fraction};
+use super::{ROW, each, mask_from, row};
 use crate::error::{Error, Result};
 use crate::mutants::{Mutant, planted, wrong};
 
@@ -46,6 +47,25 @@ pub trait PointSource: Sync {
     fn fill_1d(&self, pixel: PixelKey, first: u32, dim: &Dim1, out: &mut [f32]);
     /// Coordinate pairs of samples `first .. first + x.len()`, each in [0, 1); `x` and `y` are of one length.
     fn fill_2d(&self, pixel: PixelKey, first: u32, dim: &Dim2, x: &mut [f32], y: &mut [f32]);
+
+    /// As [`Self::fill_1d`], for `lanes` of a row and with `first` in the first of these; the other lanes stay as they are.
+    #[inline(always)]
+    fn fill_lanes_1d(&self, pixel: PixelKey, first: u32, dim: &Dim1, lanes: Range<usize>, out: &mut [f32; BLOCK]) {
+        self.fill_1d(pixel, first, dim, &mut out[lanes]);
+    }
+
+    /// As [`Self::fill_2d`], for `lanes` of two rows and with `first` in the first of these; the other lanes stay as they are.
+    #[inline(always)]
+    fn fill_lanes_2d(
+        &self,
+        pixel: PixelKey,
+        first: u32,
+        dim: &Dim2,
+        lanes: Range<usize>,
+        [x, y]: [&mut [f32; BLOCK]; 2],
+    ) {
+        self.fill_2d(pixel, first, dim, &mut x[lanes.clone()], &mut y[lanes]);
+    }
 
     /// One coordinate pair.
     fn get_2d(&self, pixel: PixelKey, index: u32, dim: &Dim2) -> [f32; 2] {
@@ -128,7 +148,7 @@ impl Sampler {
         }
         let keys = source.keys(pixel);
         for (block, (x, y)) in x.chunks_mut(BLOCK).zip(y.chunks_mut(BLOCK)).enumerate() {
-            let places = source.places(first + (block * BLOCK) as u32, x.len(), &keys);
+            let places = source.places(first + (block * BLOCK) as u32, 0..x.len(), &keys);
             for (axis, out) in [x, y].into_iter().enumerate() {
                 out.copy_from_slice(&source.fractions(axis, &places, &keys)[..out.len()]);
             }
@@ -150,46 +170,92 @@ impl PointSource for Sampler {
 
     #[inline(always)]
     fn fill_1d(&self, pixel: PixelKey, first: u32, dim: &Dim1, out: &mut [f32]) {
-        let source = self.decision(dim.decision());
-        let keys = source.keys(pixel);
-        for (block, out) in out.chunks_mut(BLOCK).enumerate() {
-            let places = source.places(first + (block * BLOCK) as u32, out.len(), &keys);
-            put_units(out, &source.fractions(0, &places, &keys));
+        for (block, out) in (0..).zip(out.chunks_mut(BLOCK)) {
+            let mut row = [0.0; BLOCK];
+            self.fill_lanes_1d(pixel, first + block * BLOCK as u32, dim, 0..out.len(), &mut row);
+            put_part(out, &row);
         }
     }
 
     #[inline(always)]
     fn fill_2d(&self, pixel: PixelKey, first: u32, dim: &Dim2, x: &mut [f32], y: &mut [f32]) {
         assert_eq!(x.len(), y.len());
+        for (block, (x, y)) in (0..).zip(x.chunks_mut(BLOCK).zip(y.chunks_mut(BLOCK))) {
+            let [mut row_x, mut row_y] = [[0.0; BLOCK]; 2];
+            let rows = [&mut row_x, &mut row_y];
+            self.fill_lanes_2d(pixel, first + block * BLOCK as u32, dim, 0..x.len(), rows);
+            put_part(x, &row_x);
+            put_part(y, &row_y);
+        }
+    }
+
+    #[inline(always)]
+    fn fill_lanes_1d(&self, pixel: PixelKey, first: u32, dim: &Dim1, lanes: Range<usize>, out: &mut [f32; BLOCK]) {
+        let source = self.decision(dim.decision());
+        let keys = source.keys(pixel);
+        let places = source.places(first, lanes.clone(), &keys);
+        put_units(out, lanes, &source.fractions(0, &places, &keys));
+    }
+
+    #[inline(always)]
+    fn fill_lanes_2d(
+        &self,
+        pixel: PixelKey,
+        first: u32,
+        dim: &Dim2,
+        lanes: Range<usize>,
+        rows: [&mut [f32; BLOCK]; 2],
+    ) {
         let source = self.decision(dim.decision());
         if source.spec.points == Points::Center {
-            x.fill(0.5);
-            y.fill(0.5);
+            for row in rows {
+                put_units(row, lanes.clone(), &[1 << 31; BLOCK]);
+            }
             return;
         }
         let keys = source.keys(pixel);
-        for (block, (x, y)) in x.chunks_mut(BLOCK).zip(y.chunks_mut(BLOCK)).enumerate() {
-            let places = source.places(first + (block * BLOCK) as u32, x.len(), &keys);
-            for (axis, out) in [x, y].into_iter().enumerate() {
-                // Unseen by the compiler, which else works out for all kinds of axes, before the loop, what one of them needs.
-                put_units(out, &source.fractions(axis, black_box(&places), &keys));
-            }
+        let places = source.places(first, lanes.clone(), &keys);
+        for (axis, out) in rows.into_iter().enumerate() {
+            // Unseen by the compiler, which else works out for all kinds of axes, before the loop, what one of them needs.
+            put_units(out, lanes.clone(), &source.fractions(axis, black_box(&places), &keys));
         }
     }
 }
 
-/// The unit-interval floats of as many fractions as `out` takes.
+/// As much of a row as there is room for.
 #[inline(always)]
-fn put_units(out: &mut [f32], fractions: &[u32; BLOCK]) {
-    let units = each(fractions, unit_f32);
+fn put_part(out: &mut [f32], row: &[f32; BLOCK]) {
     match <&mut [f32; BLOCK]>::try_from(&mut *out) {
-        Ok(whole) => *whole = units,
-        Err(_) => out.copy_from_slice(&units[..out.len()]),
+        Ok(whole) => *whole = *row,
+        Err(_) => out.copy_from_slice(&row[..out.len()]),
     }
 }
 
+/// The unit-interval floats of the fractions in these lanes.
+#[inline(always)]
+fn put_units(out: &mut [f32; BLOCK], lanes: Range<usize>, fractions: &[u32; BLOCK]) {
+    let units = each(fractions, unit_f32);
+    if lanes.len() == BLOCK {
+        *out = units;
+        return;
+    }
+    for ((out, unit), inside) in out.iter_mut().zip(units).zip(mask(&lanes)) {
+        *out = f32::from_bits((unit.to_bits() & inside) | (out.to_bits() & !inside));
+    }
+}
+
+/// All bits in these lanes, none in the others.
+#[inline(always)]
+fn mask(lanes: &Range<usize>) -> [u32; BLOCK] {
+    let mut mask = [0; BLOCK];
+    for (mask, (from, after)) in mask.iter_mut().zip(mask_from(lanes.start).iter().zip(mask_from(lanes.end))) {
+        *mask = from & !after;
+    }
+    mask
+}
+
 /// Indices looked up at once: what stays the same along a span is decided once a block.
-const BLOCK: usize = 16;
+pub const BLOCK: usize = ROW;
 
 /// One decision's numbers: the specification made ready.
 #[derive(Debug, Clone)]
@@ -222,6 +288,26 @@ enum AxisKind {
     HammersleyX(Divisor),
     VanDerCorput,
     Sobol(SobolAxis),
+}
+
+/// π(i) for the lanes of a block.
+enum Places {
+    /// Lane l stands for this and l more. Modulo 2³²: what comes before the first lane asked for may lie below 0, and what comes after
+    /// the last beyond the count. Nobody reads these.
+    Run(u32),
+    /// Any order; 0 in lanes that nobody reads.
+    Any([u32; BLOCK]),
+}
+
+impl Places {
+    /// The places in a row, none of them below 0.
+    #[inline(always)]
+    fn row(&self) -> [u32; BLOCK] {
+        match self {
+            Self::Run(first) => row(*first),
+            Self::Any(places) => *places,
+        }
+    }
 }
 
 /// The keys of one decision in one pixel.
@@ -308,30 +394,34 @@ impl DecisionSampler {
         }
     }
 
-    /// π(i) for `count` ≤ [`BLOCK`] consecutive indices. What follows them nobody reads: indices that go on, so that they stay a
-    /// row, or 0 where the order is shuffled.
+    /// π(i) for the indices from `first` on, in these lanes.
     #[inline(always)]
-    fn places(&self, first: u32, count: usize, keys: &Keys) -> [u32; BLOCK] {
+    fn places(&self, first: u32, lanes: Range<usize>, keys: &Keys) -> Places {
         // Also in release: beyond its count Hammersley's x is 1 and strata begin anew.
-        let end = u64::from(first) + count as u64;
+        let end = u64::from(first) + lanes.len() as u64;
         assert!(end <= u64::from(self.samples), "samples {first} to {end} asked of {}", self.samples);
-        let mut places = [0; BLOCK];
-        for (lane, place) in (0..).zip(&mut places) {
-            *place = if (lane as usize) < count || self.spec.order != Order::Shuffle { first + lane } else { 0 };
+        assert!(lanes.end <= BLOCK);
+        let before = lanes.start as u32;
+        if self.spec.order != Order::Shuffle || planted(Mutant::ShuffleForgotten) {
+            return Places::Run(first.wrapping_sub(before));
         }
-        if self.spec.order == Order::Shuffle && planted(Mutant::ShuffleWithReplacement) {
-            places[..count].iter_mut().for_each(|place| *place = bits32(keys.shuffle, *place) % self.samples);
-        } else if self.spec.order == Order::Shuffle && !planted(Mutant::ShuffleForgotten) {
+        let mut places = [0; BLOCK];
+        for (lane, (place, inside)) in (0u32..).zip(places.iter_mut().zip(mask(&lanes))) {
+            *place = first.wrapping_add(lane.wrapping_sub(before)) & inside;
+        }
+        if planted(Mutant::ShuffleWithReplacement) {
+            places[lanes].iter_mut().for_each(|place| *place = bits32(keys.shuffle, *place) % self.samples);
+        } else {
             Permutation::new(self.samples, keys.shuffle).places(&mut places);
         }
-        places
+        Places::Any(places)
     }
 
     /// R(P(i, axis)) as a 32-bit fraction, for every place.
     ///
     /// What kind of axis this is gets looked at once, so that each loop is straight arithmetic.
     #[inline(always)]
-    fn fractions(&self, axis: usize, places: &[u32; BLOCK], keys: &Keys) -> [u32; BLOCK] {
+    fn fractions(&self, axis: usize, places: &Places, keys: &Keys) -> [u32; BLOCK] {
         let key = keys.axes[axis];
         let [columns, rows] = self.strata;
         let row_length = if planted(Mutant::StrataTransposed) { rows } else { columns };
@@ -340,20 +430,32 @@ impl DecisionSampler {
         let column = |i: u32| row_length.remainder(i.into()) as u32;
         let row = |i: u32| row_length.quotient(i.into()) as u32;
         match &self.axes[axis].kind {
-            AxisKind::Uniform => each(places, |i| bits32(key, i)),
-            AxisKind::StratifiedX => each(places, |i| stratum_fraction(column(i), columns, jitter(i))),
-            AxisKind::StratifiedY => each(places, |i| stratum_fraction(row(i), rows, jitter(i))),
-            AxisKind::Halton(halton) if self.spec.random == Random::Digits => halton.digit_scrambled(places, key),
-            AxisKind::Halton(halton) => self.randomised(key, halton.radical_inverses(places)),
+            AxisKind::Uniform => each(&places.row(), |i| bits32(key, i)),
+            AxisKind::StratifiedX => each(&places.row(), |i| stratum_fraction(column(i), columns, jitter(i))),
+            AxisKind::StratifiedY => each(&places.row(), |i| stratum_fraction(row(i), rows, jitter(i))),
+            AxisKind::Halton(halton) if self.spec.random == Random::Digits => halton.digit_scrambled(&places.row(), key),
+            AxisKind::Halton(halton) => {
+                let plain = match places {
+                    Places::Run(first) => halton.run(*first),
+                    Places::Any(places) => halton.radical_inverses(places),
+                };
+                self.randomised(key, plain)
+            }
             AxisKind::HammersleyX(cells) if self.spec.random == Random::Yxor => {
-                each(places, |i| stratum_fraction(i, *cells, 0))
+                each(&places.row(), |i| stratum_fraction(i, *cells, 0))
             }
-            AxisKind::HammersleyX(cells) => self.randomised(key, each(places, |i| stratum_fraction(i, *cells, 0))),
+            AxisKind::HammersleyX(cells) => self.randomised(key, each(&places.row(), |i| stratum_fraction(i, *cells, 0))),
             AxisKind::VanDerCorput if planted(Mutant::BytesReversed) => {
-                self.randomised(key, each(places, u32::swap_bytes))
+                self.randomised(key, each(&places.row(), u32::swap_bytes))
             }
-            AxisKind::VanDerCorput => self.randomised(key, each(places, |i| (i + skipped).reverse_bits())),
-            AxisKind::Sobol(sobol) => self.randomised(key, sobol.fractions(each(places, |i| i + skipped))),
+            AxisKind::VanDerCorput => self.randomised(key, each(&places.row(), |i| (i + skipped).reverse_bits())),
+            AxisKind::Sobol(sobol) => {
+                let plain = match places {
+                    Places::Run(first) => sobol.run(first.wrapping_add(skipped)),
+                    Places::Any(places) => sobol.fractions(&each(places, |i| i + skipped)),
+                };
+                self.randomised(key, plain)
+            }
         }
     }
 
@@ -377,7 +479,7 @@ impl DecisionSampler {
     fn fraction(&self, axis: usize, i: u32, keys: &Keys) -> u32 {
         let mut places = [0; BLOCK];
         places[0] = i;
-        self.fractions(axis, &places, keys)[0]
+        self.fractions(axis, &Places::Any(places), keys)[0]
     }
 
     /// The same value correctly rounded to f64 where the 32-bit fraction is not exact.
@@ -415,7 +517,7 @@ pub fn point_set(spec: SamplerSpec, asked: u32, seed: u64) -> Result<Vec<[f64; 2
     let keys = source.keys(PixelKey::new(0, 0));
     Ok((0..sampler.samples)
         .map(|i| {
-            let [place, ..] = source.places(i, 1, &keys);
+            let [place, ..] = source.places(i, 0..1, &keys).row();
             [0, 1].map(|axis| source.coordinate_f64(axis, place, &keys))
         })
         .collect())

@@ -1,5 +1,7 @@
 //! Sobol' sequences, the (0,2)-sequence among them, and their scrambles: digital shift and nested uniform (Owen).
 
+use super::{ROW, each, mask_from};
+
 /// Direction numbers of Joe & Kuo (2008), doi:10.1137/070709359, criterion D(6), dimensions 2 to 256, under their notice:
 /// lines that begin with `#`.
 const JOE_KUO: &str = include_str!("new-joe-kuo-6.256.txt");
@@ -12,7 +14,12 @@ pub const DIMENSIONS: u32 = 256;
 pub struct SobolAxis {
     columns: [u32; 32],
     tables: Box<[[u32; 256]; 3]>,
+    /// What the lowest four digits of an index give, twice over: any run of [`RUN`] is in one piece.
+    low: [u32; 2 * RUN],
 }
+
+/// Consecutive indices looked up at once.
+pub const RUN: usize = ROW;
 
 impl SobolAxis {
     /// Coordinate number `dimension` (0 is van der Corput's), or `None` beyond the table's [`DIMENSIONS`].
@@ -25,7 +32,8 @@ impl SobolAxis {
                 table[i] = table[i & (i - 1)] ^ columns[8 * byte + i.trailing_zeros() as usize];
             }
         }
-        Some(Self { columns, tables })
+        let low = std::array::from_fn(|i| tables[0][i % RUN]);
+        Some(Self { columns, tables, low })
     }
 
     /// The 32-bit fraction of point `index` < 2²⁴.
@@ -36,24 +44,27 @@ impl SobolAxis {
             ^ self.tables[2][((index >> 16) & 255) as usize]
     }
 
-    /// [`Self::fraction`] of several indices at once.
+    /// [`Self::fraction`] of `first` and the indices after it. `first` may lie less than [`RUN`] below 0 (modulo 2³²): what is found
+    /// for indices below 0 means nothing.
+    ///
+    /// Two aligned rows, of which each shares all but the lowest digits.
     #[inline(always)]
-    pub fn fractions<const N: usize>(&self, indices: [u32; N]) -> [u32; N] {
-        let first = indices[0];
-        let run = (0..).zip(indices).fold(first & 15 == 0 && N <= 16, |run, (l, i)| run & (i == first + l));
-        let mut out = [0; N];
-        if run {
-            // An aligned run shares all but the lowest digits.
-            let shared = self.fraction(first);
-            for (out, low) in out.iter_mut().zip(&self.tables[0]) {
-                *out = shared ^ low;
-            }
-        } else {
-            for (out, index) in out.iter_mut().zip(indices) {
-                *out = self.fraction(index);
-            }
+    pub fn run(&self, first: u32) -> [u32; RUN] {
+        let row = first & !(RUN as u32 - 1);
+        let (here, next) = (self.fraction(row), self.fraction(row.wrapping_add(RUN as u32)));
+        let begin = (first - row) as usize;
+        let low: &[u32; RUN] = self.low[begin..][..RUN].try_into().expect("a row");
+        let mut out = [0; RUN];
+        for ((out, low), in_next) in out.iter_mut().zip(low).zip(mask_from(RUN - begin)) {
+            *out = low ^ here ^ ((here ^ next) & in_next);
         }
         out
+    }
+
+    /// [`Self::fraction`] of indices in any order.
+    #[inline(always)]
+    pub fn fractions<const N: usize>(&self, indices: &[u32; N]) -> [u32; N] {
+        each(indices, |index| self.fraction(index))
     }
 
     /// The generator matrix, column by column, most significant digit first in each word.
@@ -142,10 +153,13 @@ mod tests {
             let axis = SobolAxis::new(dimension).unwrap();
             for index in (0..300).chain([65_535, 65_536, (1 << 24) - 1]) {
                 assert_eq!(axis.fraction(index), by_definition(&axis, index));
-                let run: [u32; 16] = std::array::from_fn(|l| (index & !15) + l as u32);
-                assert_eq!(axis.fractions(run), run.map(|i| by_definition(&axis, i)));
+                // Runs that end at `index`, of any alignment; some begin below 0.
+                let first = index.wrapping_sub(RUN as u32 - 1);
+                for (i, found) in (0..RUN as u32).map(|l| first.wrapping_add(l)).zip(axis.run(first)) {
+                    assert!(i > index || found == by_definition(&axis, i), "dimension {dimension}, {i}");
+                }
                 let others: [u32; 16] = std::array::from_fn(|l| index.saturating_sub(7 * l as u32));
-                assert_eq!(axis.fractions(others), others.map(|i| by_definition(&axis, i)));
+                assert_eq!(axis.fractions(&others), others.map(|i| by_definition(&axis, i)));
             }
         }
     }

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use crate::accel::{LANES, Ray, Row, Triangle, column, set_column};
+use crate::accel::{LANES, NOTHING, Ray, Row, Triangle, column, set_column};
 use crate::mutants::{Mutant, planted};
 
 use super::mesh::Mesh;
@@ -151,37 +151,89 @@ struct FaceRows {
     normals: [[Row; 3]; 3],
 }
 
+/// One vector in every lane.
+#[inline(always)]
+fn splat(v: Vec3) -> [Row; 3] {
+    [[v.x; LANES], [v.y; LANES], [v.z; LANES]]
+}
+
+/// Puts a vector into the lanes that have this number.
+#[inline(always)]
+pub(crate) fn put_where(rows: &mut [Row; 3], numbers: &[u32; LANES], number: u32, v: Vec3) {
+    for (row, c) in rows.iter_mut().zip(v.to_array()) {
+        put_one_where(row, numbers, number, c);
+    }
+}
+
+/// Puts a number into the lanes that have this number.
+#[inline(always)]
+pub(crate) fn put_one_where<T: Copy>(row: &mut [T; LANES], numbers: &[u32; LANES], number: u32, value: T) {
+    for lane in 0..LANES {
+        // Read in any case: what is read in one branch alone keeps the loop from becoming vector instructions.
+        let old = row[lane];
+        row[lane] = if numbers[lane] == number { value } else { old };
+    }
+}
+
+/// Takes a number out of the lanes that have it: [`NOTHING`] is left there.
+#[inline(always)]
+pub(crate) fn take(numbers: &mut [u32; LANES], number: u32) {
+    for n in numbers {
+        *n = if *n == number { NOTHING } else { *n };
+    }
+}
+
 impl SurfaceRows {
     /// The surfaces where the rays met these faces, as [`surface_point`] has them; every index must be a face's.
     #[inline(always)]
     pub fn fill(&mut self, faces: &[Face], triangles: &[u32; LANES], origin: &[Row; 3], direction: &[Row; 3]) {
         let first = &faces[triangles[0] as usize];
+        self.material = [first.material; LANES];
+        self.offset = [first.offset; LANES];
         if triangles.iter().fold(true, |same, &t| same & (t == triangles[0])) {
             // The rays of one pixel often meet one triangle, which then is a constant.
-            self.material = [first.material; LANES];
-            self.offset = [first.offset; LANES];
             for lane in 0..LANES {
                 let ray = Ray { origin: column(origin, lane), direction: column(direction, lane) };
                 self.put(lane, &first.corners, &first.normals, first.face_normal, &ray);
             }
             return;
         }
-        let mut rows = FaceRows { corners: [[[0.0; LANES]; 3]; 3], normals: [[[0.0; LANES]; 3]; 3] };
-        for (lane, &triangle) in triangles.iter().enumerate() {
-            let face = &faces[triangle as usize];
-            for corner in 0..3 {
-                set_column(&mut rows.corners[corner], lane, face.corners[corner]);
-                set_column(&mut rows.normals[corner], lane, face.normals[corner]);
-            }
-            set_column(&mut self.face_normal, lane, face.face_normal);
-            self.offset[lane] = face.offset;
-            self.material[lane] = face.material;
-        }
+        let rows = self.transpose(faces, triangles);
         for lane in 0..LANES {
             let ray = Ray { origin: column(origin, lane), direction: column(direction, lane) };
-            let corners = [0, 1, 2].map(|c| column(&rows.corners[c], lane));
-            let normals = [0, 1, 2].map(|c| column(&rows.normals[c], lane));
+            let ([c0, c1, c2], [n0, n1, n2]) = (&rows.corners, &rows.normals);
+            let corners = [column(c0, lane), column(c1, lane), column(c2, lane)];
+            let normals = [column(n0, lane), column(n1, lane), column(n2, lane)];
             self.put(lane, &corners, &normals, column(&self.face_normal, lane), &ray);
+        }
+    }
+
+    /// Takes one triangle after the other and puts it into its lanes of every row: a packet rarely meets more than a few.
+    #[inline(always)]
+    fn transpose(&mut self, faces: &[Face], triangles: &[u32; LANES]) -> FaceRows {
+        let first = &faces[triangles[0] as usize];
+        let ([c0, c1, c2], [n0, n1, n2]) = (first.corners, first.normals);
+        let mut rows = FaceRows {
+            corners: [splat(c0), splat(c1), splat(c2)],
+            normals: [splat(n0), splat(n1), splat(n2)],
+        };
+        self.face_normal = splat(first.face_normal);
+        let mut left = *triangles;
+        take(&mut left, triangles[0]);
+        loop {
+            let next = left.iter().fold(NOTHING, |least, &t| least.min(t));
+            if next == NOTHING {
+                return rows;
+            }
+            let face = &faces[next as usize];
+            for corner in 0..3 {
+                put_where(&mut rows.corners[corner], &left, next, face.corners[corner]);
+                put_where(&mut rows.normals[corner], &left, next, face.normals[corner]);
+            }
+            put_where(&mut self.face_normal, &left, next, face.face_normal);
+            put_one_where(&mut self.offset, &left, next, face.offset);
+            put_one_where(&mut self.material, &left, next, face.material);
+            take(&mut left, next);
         }
     }
 
@@ -219,7 +271,7 @@ impl SurfaceRows {
 #[inline(always)]
 fn barycentric(corners: &[Vec3; 3], ray: &Ray) -> Vec3 {
     let d = ray.direction;
-    let [a, b, c] = corners.map(|p| p - ray.origin);
+    let (a, b, c) = (corners[0] - ray.origin, corners[1] - ray.origin, corners[2] - ray.origin);
     let w1 = (c - a).cross(c + a).dot(d);
     let w2 = (a - b).cross(a + b).dot(d);
     let w0 = (b - c).cross(b + c).dot(d);
