@@ -4,12 +4,12 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use sampler_lab::film::read_exr;
-use sampler_lab::render::{Growing, Pass, render};
+use sampler_lab::render::{Growing, render};
 use sampler_lab::sampling::{PointSource, Preset, Sampler, SamplerSet};
 use sampler_lab::scene::compile::{Scene, Stage, Tree};
 use sampler_lab::scene::load::{self, OpenOptions};
@@ -103,6 +103,10 @@ struct Tab {
 impl Tab {
     fn say(&mut self, value: &Value) {
         self.socket.send(Message::text(value.to_string())).unwrap();
+    }
+
+    fn set(&mut self, sets: &[&str]) {
+        self.say(&json!({"ask": "set", "sets": sets}));
     }
 
     /// The next message, and its bytes where it has any.
@@ -250,7 +254,7 @@ fn a_picture_that_grows_ends_with_the_bits_of_render() {
             growing.clear(size);
             assert_eq!(growing.block(), None);
             for &block in blocks {
-                assert!(matches!(growing.begin(&scene, &sampler, block, &|| true).unwrap(), Pass::Added { .. }));
+                assert!(growing.begin(&scene, &sampler, block, &|| true).unwrap().is_whole);
                 assert_eq!(growing.block(), Some(block));
             }
             for to in [2, 3, 17, sampler.samples()] {
@@ -264,18 +268,35 @@ fn a_picture_that_grows_ends_with_the_bits_of_render() {
                 "{text} {blocks:?}"
             );
         }
-        // One that is stopped has no sample, and begins anew.
-        if sampler.samples() > 1 {
-            growing.clear(size);
-            growing.begin(&scene, &sampler, 1, &|| true).unwrap();
-            assert_eq!(growing.add(&scene, &sampler, sampler.samples(), &|| false).unwrap(), Pass::Stopped);
-            assert_eq!((growing.samples(), growing.block()), (0, None));
-            assert_eq!(growing.begin(&scene, &sampler, 2, &|| false).unwrap(), Pass::Stopped);
-            assert_eq!(growing.block(), None);
-            growing.begin(&scene, &sampler, 1, &|| true).unwrap();
-            growing.add(&scene, &sampler, sampler.samples(), &|| true).unwrap();
-            assert_eq!(growing.image(), whole.image, "{text}");
+        // Stopped again and again, each time after a tile or so of each thread: nothing is lost, and the bits are the same.
+        growing.clear(size);
+        let mut stops = 0;
+        let asked = AtomicUsize::new(0);
+        let now_and_then = || asked.fetch_add(1, Ordering::Relaxed) % 2 == 0;
+        growing.begin(&scene, &sampler, 4, &|| true).unwrap();
+        assert!(!growing.begin(&scene, &sampler, 2, &|| false).unwrap().is_whole);
+        assert_eq!(growing.block(), Some(4), "{text}: what was known is");
+        let first = growing.mean(8, 8);
+        while growing.block() != Some(1) {
+            stops += u32::from(!growing.begin(&scene, &sampler, 1, &now_and_then).unwrap().is_whole);
+            assert_eq!(growing.mean(8, 8), first);
         }
+        for to in [2, 5, sampler.samples()].into_iter().filter(|&to| to <= sampler.samples()) {
+            while growing.samples() < to {
+                let before = growing.samples();
+                stops += u32::from(!growing.add(&scene, &sampler, to, &now_and_then).unwrap().is_whole);
+                assert!(
+                    growing.samples() >= before
+                        && growing.image().pixels.iter().all(|p| p.iter().all(|c| c.is_finite()))
+                );
+            }
+        }
+        assert!(stops > 0, "{text}");
+        assert_eq!(
+            (growing.image(), growing.samples()),
+            (whole.image, sampler.samples()),
+            "{text}: after {stops} stops"
+        );
     }
 }
 
@@ -400,8 +421,8 @@ fn bad_requests_are_refused_with_their_place_and_the_last_good_picture_stays() {
         (json!({"ask": "probe", "x": 32, "y": 0}), "expected one of 32 times 24"),
         (json!({"ask": "pick", "x": 0, "y": 4_000_000_000u32}), "expected one of 32 times 24"),
         (json!({"ask": "points", "x": 0, "y": 0, "decision": "colour"}), "expected a decision"),
-        (json!({"ask": "compare", "other": "sobol:sheet"}), "sobol"),
-        (json!({"ask": "compare", "other": "ld", "seconds": 1e12}), "seconds"),
+        (set("view.second=\"sobol:sheet\""), "view.second: sampler"),
+        (set("view.seconds=1e12"), "view.seconds: expected seconds, 0.1 to 3600"),
         (json!({"ask": "download", "what": "png", "panel": 7}), "download"),
         (json!({"ask": "format-disk"}), "expected a request of the page"),
         (json!([1, 2]), "expected a request of the page"),
@@ -602,7 +623,7 @@ fn a_tab_answers_with_values_points_distances_errors_and_spectra() {
     let (state, _) = tab.find("the new focus", |m| m["is"] == "state");
     assert!((state["focal_depth"].as_f64().unwrap() / depth - 1.0).abs() < 1e-5, "{pick} {state}");
     // Two samplers on the same samples, then on the same seconds.
-    tab.say(&json!({"ask": "compare", "other": "ld:sheet"}));
+    tab.set(&["view.second=\"ld:sheet\""]);
     let (frame, bytes) = tab.find("two panels", |m| {
         m["is"] == "frame"
             && m["panels"].as_array().unwrap().len() == 2
@@ -624,7 +645,7 @@ fn a_tab_answers_with_values_points_distances_errors_and_spectra() {
     });
     assert!(status["panels"][0]["errors"]["rmse"]["ci95"].is_array(), "with the interval of the reference's noise");
     for view in ["reference", "error", "variance", "image"] {
-        tab.say(&json!({"ask": "look", "view": view}));
+        tab.set(&[&format!("view.look={view:?}")]);
         tab.find(view, |m| m["is"] == "frame" && m["panels"][0]["view"] == view);
     }
     tab.say(&json!({"ask": "probe", "x": 5, "y": 6}));
@@ -634,7 +655,7 @@ fn a_tab_answers_with_values_points_distances_errors_and_spectra() {
     let (spectrum, _) = tab.find("a spectrum", |m| m["is"] == "spectrum" && m["panels"].as_array().unwrap().len() == 2);
     let rings = |i: usize| spectrum["panels"][i]["spectrum"]["power"].as_array().unwrap().len();
     assert!(rings(0) > 10 && rings(0) == rings(1));
-    tab.say(&json!({"ask": "compare", "other": "stratified", "seconds": 0.2}));
+    tab.set(&["view.second=\"stratified\"", "view.seconds=0.2"]);
     let (frame, _) = tab.find("both by seconds", |m| {
         m["is"] == "frame"
             && m["panels"].as_array().unwrap().iter().all(|p| p["timing"] == false && p["samples"] == p["of"])
@@ -642,12 +663,108 @@ fn a_tab_answers_with_values_points_distances_errors_and_spectra() {
     });
     assert!(frame["panels"][0]["seconds"].as_f64().unwrap() > 0.0);
     // Stopped, nothing grows; a restart goes on.
-    tab.say(&json!({"ask": "compare"}));
-    tab.say(&json!({"ask": "set", "sets": ["framebuffer.sppx=1000000"]}));
+    tab.set(&["view.second=null", "view.seconds=null"]);
+    tab.set(&["framebuffer.sppx=1000000"]);
     tab.say(&json!({"ask": "stop"}));
     tab.find("a stop", |m| m["is"] == "status" && m["state"] == "stopped");
     tab.say(&json!({"ask": "restart"}));
     tab.find("work", |m| m["is"] == "status" && m["state"] == "rendering");
+}
+
+#[test]
+fn a_refused_change_and_another_way_of_looking_leave_the_running_picture_alone() {
+    let server =
+        start("cornell.json", &["framebuffer.res_w=96", "framebuffer.res_h=64", "framebuffer.sppx=1000000"], &[]);
+    let mut tab = server.tab();
+    // With the tree that it ends with, and in the midst of it.
+    let (first, _) = tab.find("a picture under way", |m| {
+        m["is"] == "frame"
+            && m["panels"][0]["samples"].as_u64() > Some(1)
+            && m["panels"][0]["reference"].as_u64() > Some(0)
+    });
+    let epoch = first["epoch"].clone();
+    let mut samples = first["panels"][0]["samples"].as_u64().unwrap();
+    let mut goes_on = |tab: &mut Tab, what: &str| {
+        let (frame, _) = tab.until("frame");
+        assert_eq!(frame["epoch"], epoch, "{what}: begun anew");
+        let now = frame["panels"][0]["samples"].as_u64().unwrap();
+        assert!(now >= samples, "{what}: {now} samples after {samples}");
+        samples = now;
+    };
+    for refused in [
+        "camera.fov=190",
+        "framebuffer.sppx=0",
+        "framebuffer.res_w=1000000",
+        "sampler=\"ld:none\"",
+        "view.second=\"nonsense\"",
+        "view.seconds=0",
+        "scene.mesh_files=[\"absent.obj\"]",
+        "camera.pos=[1e30, 0, 0]",
+    ] {
+        let error = tab.error(&json!({"ask": "set", "sets": [refused]}));
+        assert!(error.contains("expected"), "{refused}: {error}");
+        goes_on(&mut tab, refused);
+    }
+    for shown in
+        ["framebuffer.exposure=2", "view.look=\"variance\"", "view.show=\"flip\"", "view.speed=3", "view.refine=false"]
+    {
+        tab.set(&[shown]);
+        tab.until("state");
+        goes_on(&mut tab, shown);
+    }
+    // Stopped, it stays what it is and can be saved.
+    tab.say(&json!({"ask": "stop"}));
+    tab.find("a stop", |m| m["is"] == "status" && m["state"] == "stopped");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("stopped.exr");
+    std::fs::write(&path, tab.download("exr")).unwrap();
+    let (image, provenance) = read_exr(&path).unwrap();
+    let kept: u64 = provenance.iter().find(|(key, _)| key == "spp").unwrap().1.parse().unwrap();
+    assert!(kept >= samples && image.pixels.iter().any(|p| p[0] > 0.0), "{kept} samples after {samples}");
+}
+
+#[test]
+fn how_a_tab_compares_and_shows_is_in_the_document_and_comes_back_with_it() {
+    let server = small();
+    let mut tab = server.tab();
+    tab.finished();
+    let plain = tab.download("document");
+    tab.set(&[
+        "view.second=\"ld:sheet\"",
+        "view.seconds=0.25",
+        "view.show=\"flip\"",
+        "view.look=\"error\"",
+        "view.refine=false",
+        "view.speed=1.5",
+    ]);
+    let is_set = |m: &Value| {
+        m["is"] == "state"
+            && m["config"]["view"]
+                == json!({"second": "ld:sheet", "seconds": 0.25, "show": "flip", "look": "error", "refine": false, "speed": 1.5})
+    };
+    tab.find("the view", is_set);
+    let document = tab.download("document");
+    tab.say(&json!({"ask": "reset"}));
+    let (frame, _) = tab.find("one panel", |m| m["is"] == "frame" && m["panels"].as_array().unwrap().len() == 1);
+    assert_eq!(frame["panels"][0]["view"], "image");
+    assert_eq!(tab.download("document"), plain);
+    tab.upload(1, "again.json", true, &document);
+    tab.find("the view again", is_set);
+    tab.find("two panels by seconds", |m| {
+        m["is"] == "frame" && m["panels"].as_array().unwrap().len() == 2 && m["panels"][1]["sampler"] == "ld:sheet"
+    });
+    assert_eq!(tab.download("document"), document);
+    // A scene file that says nothing of it is shown as the one before.
+    tab.say(&json!({"ask": "load", "name": "penumbra.json"}));
+    tab.find("another scene", |m| m["name"] == "penumbra.json" && is_set(m));
+    // For `render` it is the same picture.
+    let picture = |bytes: &[u8]| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        std::fs::write(&path, bytes).unwrap();
+        load::open(&path, &OpenOptions { data: vec![config("../data")], sets: Vec::new() }).unwrap().content_sha256()
+    };
+    assert_eq!(picture(&document), picture(&plain));
 }
 
 #[test]
