@@ -651,8 +651,21 @@ fn a_tab_answers_with_values_points_distances_errors_and_spectra() {
     tab.say(&json!({"ask": "probe", "x": 5, "y": 6}));
     let (probe, _) = tab.until("probe");
     assert!(probe["panels"][1]["mean"][0].is_number() && probe["reference"][2].is_number());
+    // Points and a spectrum at the same time: neither waits for the other.
     tab.say(&json!({"ask": "spectrum"}));
-    let (spectrum, _) = tab.find("a spectrum", |m| m["is"] == "spectrum" && m["panels"].as_array().unwrap().len() == 2);
+    tab.say(&json!({"ask": "points", "x": 3, "y": 4, "decision": "pixel"}));
+    let mut spectrum = Value::Null;
+    let mut has_points = false;
+    while spectrum.is_null() || !has_points {
+        let (answer, _) =
+            tab.find("a spectrum and points", |m| ["spectrum", "points", "error"].contains(&m["is"].as_str().unwrap()));
+        assert_ne!(answer["is"], "error", "{answer}");
+        match answer["is"] == "points" {
+            true => has_points = true,
+            false => spectrum = answer,
+        }
+    }
+    assert_eq!(spectrum["panels"].as_array().unwrap().len(), 2, "{spectrum}");
     let rings = |i: usize| spectrum["panels"][i]["spectrum"]["power"].as_array().unwrap().len();
     assert!(rings(0) > 10 && rings(0) == rings(1));
     tab.set(&["view.second=\"stratified\"", "view.seconds=0.2"]);

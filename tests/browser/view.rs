@@ -220,6 +220,41 @@ fn two_samplers_are_compared_and_flipped_and_the_page_fits_a_narrow_dark_window(
     let map = shown(&page, "#screen-a");
     let count = |f: &dyn Fn(&[u8]) -> bool| map.chunks(3).filter(|p| f(p)).count();
     assert!(count(&|p| p[0] > p[2]) > 20 && count(&|p| p[2] > p[0]) > 20, "brighter and darker pixels");
+    // All of it is in the document, and comes back with it.
+    page.evaluate("window.saved = []; const make = URL.createObjectURL; URL.createObjectURL = b => { window.saved.push(b); return make.call(URL, b); }; 0");
+    page.evaluate("(() => { const s = document.querySelector('#compare-seconds'); document.querySelector('#compare-by').value = 'seconds'; s.value = 0.5; s.onchange(); })()");
+    page.evaluate("document.querySelector('#refine').click()");
+    page.wheel(page.middle("#screen-a"), -100.0);
+    let speed = page.evaluate("Number(document.querySelector('#speed').textContent)");
+    page.wait_for(
+        "(v => v.seconds === 0.5 && !v.refine && v.speed !== null)(JSON.parse(document.body.dataset.document).view)",
+    );
+    let view = document(&page)["view"].clone();
+    assert_eq!(
+        view,
+        json!({"second": "ld:sheet", "seconds": 0.5, "show": "flip", "look": "error", "refine": false, "speed": speed})
+    );
+    page.evaluate("document.querySelector('#download-json').click()");
+    page.wait_for("window.saved.length === 1");
+    let text = page.evaluate("window.saved[0].text()").as_str().unwrap().to_owned();
+    page.evaluate("document.querySelector('#reset').click()");
+    page.wait_for("!document.querySelector('#compare-on').checked && document.querySelector('#refine').checked");
+    assert_eq!(page.evaluate("document.querySelector('#views input:checked').value"), "image");
+    drop_file(&page, "again.json", &text);
+    page.wait_for("document.title.startsWith('again.json')");
+    assert_eq!(document(&page)["view"], view);
+    let shown_again = page.evaluate(
+        "['#compare-other', '#compare-by', '#compare-seconds', '#compare-how', '#views input:checked'].map(s => document.querySelector(s).value)",
+    );
+    assert_eq!(shown_again, json!(["ld:sheet", "seconds", "0.5", "flip", "error"]));
+    // What is refused is marked where it was typed, and all else shows what is.
+    page.evaluate("(() => { const o = document.querySelector('#compare-other'); o.closest('details').open = true; o.focus(); o.value = 'nonsense'; o.onchange(); })()");
+    page.wait_for(
+        "document.querySelector('#compare-other').ariaInvalid === 'true' && !document.querySelector('#message').hidden",
+    );
+    page.evaluate("document.querySelector('#compare-other').blur()");
+    page.wait_for("document.querySelector('#compare-other').value === 'ld:sheet' && document.querySelector('#compare-other').ariaInvalid !== 'true'");
+    page.evaluate("document.querySelector('#message button').click()");
     page.key("1");
     for (width, scheme) in [(1000, "light"), (400, "dark")] {
         page.prefer(scheme);

@@ -3,8 +3,8 @@
 import { make, show } from "./controls.js";
 
 export class Comparison {
-  constructor(link, { presets, legal }) {
-    this.link = link;
+  /** `arrange` is told at once when pictures are to be shown in another way. */
+  constructor(link, { presets, legal }, arrange) {
     const row = (text, input) => make("div", { className: "row" }, make("label", { htmlFor: input.id, textContent: text }), input);
     const choices = (id, list) => make("select", { id }, ...list.map(([value, textContent]) => make("option", { value, textContent })));
     this.on = make("input", { type: "checkbox", id: "compare-on" });
@@ -19,7 +19,10 @@ export class Comparison {
     // What is typed while there is no second picture waits for one.
     this.other.onchange = () => this.on.checked && link.set({ "view.second": this.other.value });
     this.by.onchange = this.seconds.onchange = () => link.set({ "view.seconds": this.by.value === "seconds" ? Number(this.seconds.value) : null });
-    this.how.onchange = () => link.set({ "view.show": this.how.value });
+    this.how.onchange = () => {
+      link.set({ "view.show": this.how.value });
+      arrange();
+    };
     document.querySelector("#compare-panel").append(
       row("Second sampler (B)", this.on), row("Sampler of B", this.other), list, row("Budget", this.by), row("Seconds each", this.seconds), row("Show", this.how),
       make("p", { className: "hint", textContent: "B has the scene's seed. One sampler for all decisions, or pixel=… lens=… light-pick=… light=…. In a budget of seconds the count is chosen by what a few samples take, since a set belongs to its count." }));

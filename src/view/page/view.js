@@ -32,7 +32,7 @@ const link = new Link(
       link.bounds = hello;
       samplers = new Samplers(link, hello);
       configs = new Configs(link, $("#configs-panel"), hello.can_save, say);
-      compare = new Comparison(link, hello);
+      compare = new Comparison(link, hello, arrange);
       for (const { key, name } of hello.decisions) $("#points-decision").append(make("option", { value: key, textContent: name }));
       document.body.dataset.connected = "yes";
     },
