@@ -24,6 +24,7 @@ export class Link {
     this.drops = 0;
     /** What may be sent, once the program has said so. */
     this.bounds = { most_files: 0, most_bytes: 0 };
+    document.body.dataset.asked = this.sets = 0;
   }
 
   get isOpen() {
@@ -31,6 +32,8 @@ export class Link {
   }
 
   ask(ask, fields = {}) {
+    // The program counts changes too: where both counts are equal, none is on the way.
+    if (ask === "set") document.body.dataset.asked = ++this.sets;
     if (this.isOpen) this.socket.send(JSON.stringify({ ask, ...fields }));
   }
 
