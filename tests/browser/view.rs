@@ -144,6 +144,15 @@ fn the_page_shows_what_render_makes_of_its_document_however_it_is_driven() {
     page.wait_for("/Distance [\\d.]+, depth [\\d.]+: \\w+/.test(document.querySelector('#picked').textContent)");
     page.key("p");
     page.wait_for("document.querySelector('#points-out').textContent.includes('star discrepancy D*')");
+    // By keys: the ring moves, and the points are those of its pixel.
+    let ringed = || page.evaluate("document.querySelector('#pixel-place').textContent");
+    let before_step = ringed();
+    page.key("l");
+    page.key("k");
+    page.wait_for(&format!("document.querySelector('#pixel-place').textContent !== {before_step}"));
+    page.wait_for("document.querySelector('.panel-a .mark').checkVisibility()");
+    page.key("p");
+    page.wait_for("document.querySelector('#points-out').textContent.includes(`Pixel ${document.querySelector('#pixel-place').textContent}`)");
     // Escape stops, space goes on.
     page.key("Escape");
     page.wait_for("document.body.dataset.state === 'stopped'");
@@ -257,6 +266,14 @@ fn two_samplers_are_compared_and_flipped_and_the_page_fits_a_narrow_dark_window(
     page.wait_for("document.querySelector('#compare-other').value === 'ld:sheet' && document.querySelector('#compare-other').ariaInvalid !== 'true'");
     page.evaluate("document.querySelector('#message button').click()");
     page.key("1");
+    // By keys alone: a panel opens, its first control is next, and Escape leads back.
+    page.evaluate("(document.querySelectorAll('nav details').forEach(d => d.open = false), document.querySelector('nav summary').focus())");
+    page.key("Enter");
+    page.wait_for("document.querySelector('nav details').open");
+    page.key("Tab");
+    assert_eq!(page.evaluate("document.activeElement.closest('.panel').id"), "camera-panel");
+    page.key("Escape");
+    page.wait_for("!document.querySelector('nav details').open && document.activeElement.matches('summary')");
     for (width, scheme) in [(1000, "light"), (400, "dark")] {
         page.prefer(scheme);
         page.resize(width, 700);

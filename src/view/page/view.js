@@ -71,6 +71,8 @@ const link = new Link(
     pick({ distance, depth, material, emits, focused }) {
       const what = distance == null ? "Nothing there." : `Distance ${number(distance)}, depth ${number(depth)}: ${material}${emits ? " (emits)" : ""}.`;
       $("#picked").textContent = what + (focused ? " In focus now." : "");
+      // Where the numbers lie below the picture, they would not be seen.
+      if (matchMedia("(max-width: 56rem)").matches) say($("#picked").textContent, true);
     },
     points({ about, sets }) {
       const title = about.file ? `${about.file}` : `Pixel (${about.x}, ${about.y}), ${about.name}`;
@@ -176,8 +178,28 @@ function showProbe({ x, y, panels: values, reference }) {
 let under = null, dragFrom = null, probing = 0;
 const middle = () => ({ x: screens[0].full[0] >> 1, y: screens[0].full[1] >> 1 });
 
+/** Rings a pixel and shows its values. */
+function choose(pixel) {
+  picked = pixel;
+  for (const screen of screens) screen.mark(pixel);
+  link.ask("probe", pixel);
+}
+
 function askPoints() {
-  link.ask("points", { ...(picked ?? under ?? middle()), decision: $("#points-decision").value || "pixel" });
+  choose(under ?? picked ?? middle());
+  link.ask("points", { ...picked, decision: $("#points-decision").value || "pixel" });
+}
+
+const STEPS = { KeyI: [0, -1], KeyK: [0, 1], KeyJ: [-1, 0], KeyL: [1, 0] };
+
+/** Moves the ring by a pixel, or ten. */
+function step([dx, dy], far) {
+  const [w, h] = screens[0].full;
+  const inside = (i, n) => Math.max(0, Math.min(n - 1, i));
+  const { x, y } = picked ?? middle();
+  // The keys' until the mouse moves again.
+  under = null;
+  choose({ x: inside(x + dx * far, w), y: inside(y + dy * far, h) });
 }
 
 for (const screen of screens) {
@@ -211,7 +233,9 @@ for (const screen of screens) {
     pick(screen.pixelAt(event));
   });
   canvas.addEventListener("dblclick", (event) => {
-    picked = screen.pixelAt(event);
+    const pixel = screen.pixelAt(event);
+    if (!pixel) return;
+    choose(pixel);
     askPoints();
   });
   canvas.addEventListener("wheel", (event) => {
@@ -224,8 +248,7 @@ addEventListener("blur", () => flight.releaseAll());
 
 function pick(pixel) {
   if (!pixel) return;
-  picked = pixel;
-  link.ask("probe", pixel);
+  choose(pixel);
   link.ask("pick", pixel);
 }
 
@@ -257,10 +280,11 @@ addEventListener("keydown", (event) => {
   else if (event.code === "Space") {
     event.preventDefault();
     link.ask("restart");
-  } else if (event.repeat) return;
+  } else if (event.code in STEPS) step(STEPS[event.code], event.shiftKey ? 10 : 1);
+  else if (event.repeat) return;
   else if (event.code === "KeyX") flip();
   else if (event.code === "KeyP") askPoints();
-  else if (event.code === "Enter") pick(under ?? middle());
+  else if (event.code === "Enter") pick(under ?? picked ?? middle());
   else if (event.key === "+" || event.key === "-") faster(event.key === "+" ? 1 : -1);
   else if (/^[1-4]$/.test(event.key)) look(Number(event.key) - 1);
 });
