@@ -13,7 +13,7 @@ use sampler_lab::render::{Growing, render};
 use sampler_lab::sampling::{PointSource, Preset, Sampler, SamplerSet};
 use sampler_lab::scene::compile::{Scene, Stage, Tree};
 use sampler_lab::scene::load::{self, OpenOptions};
-use sampler_lab::view::{MAX_TABS, MAX_UPLOAD_FILES, MAX_VIEW_PIXELS, Options, Server};
+use sampler_lab::view::{MAX_TABS, MAX_UPLOAD_BYTES, MAX_UPLOAD_FILES, MAX_VIEW_PIXELS, Options, Server};
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::protocol::WebSocketConfig;
@@ -511,6 +511,16 @@ fn uploads_stay_in_their_folder_and_go_with_the_tab() {
     // Other tests run at the same time: those of this server are gone with it.
     let left = |f: &String| std::env::temp_dir().join(f).join("1").join("6").join("tri.obj").exists();
     assert!(!made.iter().any(left));
+}
+
+#[test]
+fn a_message_that_is_too_large_is_refused_in_words_before_it_is_kept() {
+    let server = small();
+    let mut tab = server.tab();
+    tab.upload(1, "huge.obj", true, &vec![b' '; MAX_UPLOAD_BYTES + (1 << 20)]);
+    let (refused, _) = tab.until("refused");
+    assert!(refused["text"].as_str().unwrap().contains("expected one of bounded size"), "{refused}");
+    server.tab().finished();
 }
 
 #[test]

@@ -199,6 +199,14 @@ fn a_downloaded_config_that_is_dropped_again_is_the_same_picture() {
     drop_file(&page, "broken.json", "{\"camera\": {\"fvo\": 3}}");
     page.wait_for("document.querySelector('#message').textContent.includes('did you mean \"fov\"')");
     assert!(shown(&page, "#screen-a") == picture);
+    // One that the program would not take is not even sent.
+    page.evaluate(
+        "(() => { const t = new DataTransfer(); t.items.add(new File([new Uint8Array(65 << 20)], 'huge.obj')); \
+         window.dispatchEvent(new DragEvent('drop', { dataTransfer: t, bubbles: true, cancelable: true })); })()",
+    );
+    page.wait_for(
+        "document.querySelector('#message').textContent.includes('huge.obj: expected at most 67108864 bytes')",
+    );
     drop_file(&page, "mine.csv", "0.25,0.75\n0.5,0.5\n");
     page.wait_for("document.querySelector('#points-out').textContent.includes('mine.csv')");
     assert_eq!(page.errors(), Vec::<String>::new());
@@ -287,6 +295,95 @@ fn two_samplers_are_compared_and_flipped_and_the_page_fits_a_narrow_dark_window(
             assert_eq!(findings(&page), Vec::<String>::new(), "panel {panel} at {width} pixels");
         }
     }
+    assert_eq!(page.errors(), Vec::<String>::new());
+}
+
+/// All controls of the document (of the materials those of the first), and a change of the one at an index: its name, or null where it already is so.
+const CONTROLS: &str = r##"
+  window.every = () => [...document.querySelectorAll(".panel input, .panel select, #views input, #refine")].filter((c) =>
+    !c.disabled && !c.closest("#keys-panel, #configs-panel") && c.ariaLabel !== "Usual sizes"
+    && (!c.closest("#materials-panel") || c.closest("fieldset") === document.querySelector("#materials-panel fieldset")));
+  window.nameOf = (c) => `${c.closest("fieldset")?.querySelector("legend")?.textContent ?? ""} ${c.ariaLabel || c.labels[0]?.textContent || c.id} (${c.type})`.trim();
+  window.turn = (i) => {
+    const c = every()[i];
+    if (!c) return "none left";
+    const name = nameOf(c);
+    const fire = (...events) => events.forEach((event) => c.dispatchEvent(new Event(event, { bubbles: true })));
+    if (c.type === "radio" && c.checked) return null;
+    if (c.type === "checkbox" || c.type === "radio") c.click();
+    else if (c.tagName === "SELECT") {
+      c.value = [...c.options].find((o) => o.value && o.value !== c.value).value;
+      fire("change");
+    } else {
+      const number = c.step === "1" ? Number(c.value) + 1 : Number((Number(c.value) * 0.9 + 0.01).toPrecision(4));
+      c.value = { range: (Number(c.min) + Number(c.max)) / 2.1, color: "#336699", text: c.id === "seed" ? "77" : "ld:sheet" }[c.type] ?? number;
+      fire("input", "change");
+    }
+    return name;
+  };
+"##;
+
+#[test]
+fn a_change_of_any_control_is_in_the_document_and_comes_back_with_it() {
+    let Some(browser) = Browser::start() else { return };
+    let serving = small();
+    let page = browser.page();
+    page.open(&serving.address);
+    finished(&page);
+    page.evaluate(&format!("{CONTROLS}; 0"));
+    let mut changed = Vec::new();
+    for i in 0.. {
+        let before = page.evaluate("document.body.dataset.document");
+        let name = page.evaluate(&format!("turn({i})"));
+        if name == "none left" {
+            break;
+        }
+        let Some(name) = name.as_str() else { continue };
+        page.wait_for(&format!(
+            "document.body.dataset.document !== {before} || !document.querySelector('#message').hidden"
+        ));
+        let said = page.evaluate(
+            "document.querySelector('#message').hidden ? '' : document.querySelector('#message').textContent",
+        );
+        assert_eq!(said, "", "{name}: refused");
+        if name.contains("(range)") || name.contains("(color)") {
+            // One that moves says more than once what it comes to.
+            page.wait_for("document.body.dataset.asked === document.body.dataset.answered");
+        }
+        changed.push(name.to_owned());
+    }
+    let has = |part: &str| changed.iter().any(|name| name.contains(part));
+    for part in [
+        "Position x",
+        "Field of view",
+        "Auto focus",
+        "Focal depth",
+        "Power",
+        "Off: light",
+        "Albedo",
+        "Exposure",
+        "Width",
+        "lens: points",
+        "Seed",
+        "Estimator",
+        "Sampler of B",
+        "Seconds",
+        "Show",
+        "Variance",
+        "refine",
+    ] {
+        assert!(has(part), "{part} is none of {changed:?}");
+    }
+    assert!(changed.len() > 50, "{changed:?}");
+    let values = "every().map((c) => `${nameOf(c)}: ${['checkbox', 'radio'].includes(c.type) ? c.checked : c.value}`)";
+    let (whole, shown) = (document(&page), page.evaluate(values));
+    drop_file(&page, "plain.json", &json!({"framebuffer": {"res_w": 32, "res_h": 24, "sppx": 1}, "scene": {"mesh_files": ["checkerpots/checkerpots.obj"]}, "view": {}}).to_string());
+    page.wait_for("document.title.startsWith('plain.json')");
+    assert!(document(&page) != whole && page.evaluate(values) != shown);
+    drop_file(&page, "again.json", &whole.to_string());
+    page.wait_for("document.title.startsWith('again.json')");
+    assert_eq!(document(&page), whole);
+    assert_eq!(page.evaluate(values), shown);
     assert_eq!(page.errors(), Vec::<String>::new());
 }
 
