@@ -79,7 +79,7 @@ export class Controls {
     const inputs = ["x", "y", "z"].map((axis) => make("input", { type: "number", step: "any", ariaLabel: `${text} ${axis}` }));
     // One by one: what is shown of the others is rounded.
     inputs.forEach((input, i) => (input.onchange = () => input.value !== "" && this.link.set({ [`${key}.${i}`]: Number(input.value) })));
-    this.updates.push((state) => inputs.forEach((input, i) => show(input, Number(at(state.config, key)[i].toPrecision(6)))));
+    this.updates.push((state) => inputs.forEach((input, i) => show(input, Number(at(state.config, key)[i].toPrecision(5)))));
     return row(text, make("div", { className: "three" }, ...inputs), inputs[0]);
   }
 

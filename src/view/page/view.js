@@ -13,7 +13,10 @@ const $ = (selector) => document.querySelector(selector);
 const screens = [new Screen("a"), new Screen("b")];
 let samplers, configs, compare, picked, flipped = 0, panels = 1, spectral = 0;
 
+/** Says what went wrong until it is closed or mended; what is good to know for some seconds. */
 function say(text, good = false) {
+  clearTimeout(say.ends);
+  if (good) say.ends = setTimeout(() => say(""), 5000);
   $("#message").hidden = !text;
   $("#message").classList.toggle("good", good);
   $("#message span").textContent = text;
