@@ -12,7 +12,7 @@ use sampler_lab::film::{check_writable, write_exr, write_png};
 use sampler_lab::render::render_observed;
 use sampler_lab::sampling::{Decision, MAX_SAMPLES, PointSource, Sampler};
 use sampler_lab::scene::compile::{Scene, Stage};
-use sampler_lab::scene::config::{Estimator, SceneConfig};
+use sampler_lab::scene::config::{Estimator, SceneConfig, ViewConfig};
 use serde_json::json;
 
 use super::{DecisionArgs, SceneArgs, WorkArgs, print_json, say};
@@ -108,6 +108,8 @@ impl Render {
         let build_seconds = started.elapsed().as_secs_f64();
         self.work.warn(&loaded.warnings);
         self.work.warn(&scene.warnings);
+        let view_note = loaded.config.view.as_ref().and_then(ViewConfig::note);
+        self.work.warn(view_note.as_slice());
         self.work.warn(&self.decisions.notes(&self.scene, &scene.layout));
 
         let asked = self.spp.unwrap_or(framebuffer.sppx);

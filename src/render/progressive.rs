@@ -30,27 +30,30 @@ struct Gathered {
 ///
 /// Once the samples `0..n` of every pixel have been added, by whatever passes, [`Growing::image`] has the bits of
 /// [`render`](super::render) with the same scene and source: a pixel's sum is formed in the order of the indices.
+///
+/// A pass that is told to stop loses nothing: the tiles that it came to are ahead of the others, and the next pass goes on from there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Growing {
     width: u32,
     height: u32,
     pixels: Vec<Gathered>,
-    /// Samples that every pixel has.
+    /// Samples that the pixels of each tile have, row by row of tiles; a pass that was told to stop leaves some ahead.
+    tiles: Vec<u32>,
+    /// Samples that every pixel has: the least of `tiles`.
     done: u32,
     /// Where no pixel is complete yet: the sides of blocks whose first pixel, top left, has its first sample; 0 for none.
     block: u32,
 }
 
 /// What a pass came to.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Pass {
-    /// Everything asked for was added: camera and shadow rays.
-    Added {
-        /// Camera and shadow rays.
-        rays: u64,
-    },
-    /// Told to stop: some pixels had the samples already and others had not, so the picture has none again.
-    Stopped,
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pass {
+    /// Samples of pixels that were traced.
+    pub samples: u64,
+    /// Camera and shadow rays.
+    pub rays: u64,
+    /// Whether everything asked for is there; else it was told to stop, and the next pass goes on from there.
+    pub is_whole: bool,
 }
 
 impl Growing {
@@ -58,12 +61,14 @@ impl Growing {
     pub fn new(size: (u32, u32)) -> Self {
         let (width, height) = size;
         let pixels = vec![Gathered::default(); width as usize * height as usize];
-        Self { width, height, pixels, done: 0, block: 0 }
+        let tiles = vec![0; (width as usize).div_ceil(TILE) * (height as usize).div_ceil(TILE)];
+        Self { width, height, pixels, tiles, done: 0, block: 0 }
     }
 
     /// Begins anew, with memory kept where the size stays: a pixel's first sample takes the place of what it had.
     pub fn clear(&mut self, size: (u32, u32)) {
         if size == (self.width, self.height) {
+            self.tiles.fill(0);
             (self.done, self.block) = (0, 0);
         } else {
             *self = Self::new(size);
@@ -92,7 +97,8 @@ impl Growing {
     /// Adds the first sample to the first pixel, top left, of each block of `block` × `block` that does not have it yet. Blocks
     /// halve from pass to pass, or start at any size; with `block` 1 every pixel has its first sample.
     ///
-    /// `go_on` is asked after each few pixels, from several threads.
+    /// `go_on` is asked after each few pixels, from several threads. Where it says no, the blocks are those of before, and of the new
+    /// pixels those of whole tiles are kept with `block` 1, none else.
     ///
     /// # Errors
     /// A sample whose radiance is not finite; the picture has none again.
@@ -110,17 +116,19 @@ impl Growing {
         assert!(self.done == 0 && block > 0 && block != known && known.is_multiple_of(block), "{block} after {known}");
         let on = |p: u32, side: u32| side > 0 && p.is_multiple_of(side);
         let wanted = |x: u32, y: u32| on(x, block) && on(y, block) && !(on(x, known) && on(y, known));
-        // What a pass leaves behind when it ends early counts for nothing.
-        (self.done, self.block) = (0, 0);
-        let pass = self.pass(scene, source, 0..1, &wanted, go_on)?;
-        if pass != Pass::Stopped {
+        // Pixels that are known are not wanted, and stay as they are whatever becomes of the pass.
+        let pass = self.pass(scene, source, 1, &wanted, go_on)?;
+        if pass.is_whole {
             (self.done, self.block) = if block == 1 { (1, 0) } else { (0, block) };
+        }
+        if block > 1 {
+            // A count is of all pixels of a tile.
+            self.tiles.fill(0);
         }
         Ok(pass)
     }
 
-    /// Adds the samples from [`Growing::samples`] up to, and without, `to` to every pixel; pixels that already have their first
-    /// one of a picture that has only begun start at the second.
+    /// Adds the samples up to, and without, `to` to every pixel that does not have them yet.
     ///
     /// # Errors
     /// As [`Growing::begin`].
@@ -135,40 +143,46 @@ impl Growing {
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Pass, NonFinite> {
         assert!(self.block == 0 && to > self.done && to <= source.samples(), "samples {}..{to}", self.done);
-        let samples = self.done..to;
-        self.done = 0;
-        let pass = self.pass(scene, source, samples, &|_, _| true, go_on)?;
-        if pass != Pass::Stopped {
-            self.done = to;
-        }
+        let pass = self.pass(scene, source, to, &|_, _| true, go_on)?;
+        self.done = self.tiles.iter().copied().min().unwrap_or(to);
         Ok(pass)
     }
 
+    /// Takes the wanted pixels of every tile to `to` samples.
     fn pass<S: PointSource>(
         &mut self,
         scene: &Scene,
         source: &S,
-        samples: std::ops::Range<u32>,
+        to: u32,
         wanted: &(dyn Fn(u32, u32) -> bool + Sync),
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Pass, NonFinite> {
         assert_eq!(scene.camera.size(), self.size(), "the scene is for pictures of another size");
         let width = self.width as usize;
-        let (stopped, rays) = (AtomicBool::new(false), AtomicU64::new(0));
+        let stopped = AtomicBool::new(false);
+        let (traced, rays) = (AtomicU64::new(0), AtomicU64::new(0));
         let first_bad: Mutex<Option<NonFinite>> = Mutex::new(None);
-        self.pixels.par_chunks_mut(width * TILE).enumerate().for_each_init(Lanes::default, |lanes, (band, pixels)| {
+        let bands = self.pixels.par_chunks_mut(width * TILE).zip(self.tiles.par_chunks_mut(width.div_ceil(TILE)));
+        bands.enumerate().for_each_init(Lanes::default, |lanes, (band, (pixels, tiles))| {
             let y0 = band * TILE;
             let rows = pixels.len() / width;
-            for x0 in (0..width).step_by(TILE) {
+            for (x0, tile) in (0..width).step_by(TILE).zip(tiles) {
                 if stopped.load(Ordering::Relaxed) {
                     return;
+                }
+                if *tile >= to {
+                    continue;
                 }
                 let columns = x0..(x0 + TILE).min(width);
                 let places = (0..rows).flat_map(|y| columns.clone().map(move |x| (x as u32, (y0 + y) as u32)));
                 let places: Vec<(u32, u32)> = places.filter(|&(x, y)| wanted(x, y)).collect();
-                let (samples, band) = (samples.clone(), Band { pixels, width, y0 });
+                let (samples, band) = (*tile..to, Band { pixels, width, y0 });
+                traced.fetch_add(places.len() as u64 * u64::from(to - *tile), Ordering::Relaxed);
                 match scene.accel.kernel().run(Tile { scene, source, places: &places, samples, band, lanes }) {
-                    Ok(traced) => _ = rays.fetch_add(traced, Ordering::Relaxed),
+                    Ok(shot) => {
+                        *tile = to;
+                        rays.fetch_add(shot, Ordering::Relaxed);
+                    }
                     Err(bad) => {
                         stopped.store(true, Ordering::Relaxed);
                         first_bad.lock().expect("nobody panics with it").get_or_insert(bad);
@@ -180,17 +194,24 @@ impl Growing {
             }
         });
         if let Some(bad) = first_bad.into_inner().expect("nobody panics with it") {
+            self.clear(self.size());
             return Err(bad);
         }
-        Ok(if stopped.into_inner() { Pass::Stopped } else { Pass::Added { rays: rays.into_inner() } })
+        let is_whole = self.tiles.iter().all(|&tile| tile >= to);
+        Ok(Pass { samples: traced.into_inner(), rays: rays.into_inner(), is_whole })
     }
 
     /// The mean radiance of a pixel so far; of one that has no sample, that of its block.
     pub fn mean(&self, x: u32, y: u32) -> [f32; 3] {
         let side = self.block().unwrap_or(1);
         let at = (y - y % side) as usize * self.width as usize + (x - x % side) as usize;
-        let count = f64::from(self.done.max(1));
+        let count = f64::from(self.samples_of(x, y).max(1));
         self.pixels[at].sum.map(|s| (s / count) as f32)
+    }
+
+    /// Samples that a pixel has: [`Growing::samples`], or more where a pass was told to stop behind it.
+    fn samples_of(&self, x: u32, y: u32) -> u32 {
+        self.tiles[y as usize / TILE * (self.width as usize).div_ceil(TILE) + x as usize / TILE]
     }
 
     /// The picture so far at one pixel a block: its size is that of the picture divided by [`Growing::block`], rounded up.
@@ -223,7 +244,7 @@ impl Growing {
     /// those of a good set are not, and their mean errs less.
     pub fn luma_variance(&self, x: u32, y: u32) -> Option<f64> {
         let pixel = &self.pixels[y as usize * self.width as usize + x as usize];
-        let n = f64::from(self.done);
+        let n = f64::from(self.samples_of(x, y));
         let [r, g, b] = pixel.sum;
         let sum = 0.2126 * r + 0.7152 * g + 0.0722 * b;
         (self.done > 1).then(|| ((pixel.luma_squared - sum * sum / n) / (n - 1.0)).max(0.0))

@@ -10,6 +10,10 @@ use glam::Vec3;
 use super::json::{self, Fields, Item, Place, Value, suggestion};
 use crate::error::{Error, Result};
 
+mod view;
+
+pub use view::{Look, Show, ViewConfig};
+
 /// Most samples a pixel, 2^24: above, a sample index has no exact `f32`.
 pub const MAX_SPP: u32 = 1 << 24;
 
@@ -40,6 +44,8 @@ pub struct SceneConfig {
     pub sampler: Option<String>,
     /// The seed of the randomisation; absent where the file leaves it open.
     pub seed: Option<u64>,
+    /// How the live view shows it; absent where the file leaves it open.
+    pub view: Option<ViewConfig>,
     /// Known keys that are kept and exported but not modelled, each with the object it stands in (`""` is the top).
     pub unmodelled: Vec<(Section, String, Value)>,
 }
@@ -120,9 +126,12 @@ pub enum Section {
     Scene,
     /// An element of `scene.materials`
     Patch,
+    /// `view`
+    View,
 }
 
-const SECTIONS: [Section; 5] = [Section::Top, Section::Camera, Section::Framebuffer, Section::Scene, Section::Patch];
+const SECTIONS: [Section; 6] =
+    [Section::Top, Section::Camera, Section::Framebuffer, Section::Scene, Section::Patch, Section::View];
 
 impl Section {
     /// The keys that mean something here.
@@ -138,11 +147,13 @@ impl Section {
                 "estimator",
                 "sampler",
                 "seed",
+                "view",
             ],
             Self::Camera => &["pos", "dir", "up", "fov", "lens_radius", "focal_depth"],
             Self::Framebuffer => &["res_w", "res_h", "sppx", "exposure"],
             Self::Scene => &["mesh_files", "materials", "sky", "volume"],
             Self::Patch => &["name", "type", "albedo_col", "emissive_strength"],
+            Self::View => &["second", "seconds", "show", "look", "refine", "speed"],
         }
     }
 
@@ -159,6 +170,7 @@ impl Section {
             Self::Patch => matches!(key, "ior" | "roughness" | "absorb" | "coated" | "specular_col"),
             Self::Framebuffer => key == "hdr" || of_an_algorithm,
             Self::Top | Self::Camera | Self::Scene => of_an_algorithm,
+            Self::View => false,
         }
     }
 
@@ -179,6 +191,7 @@ impl Section {
             Self::Framebuffer => "framebuffer",
             Self::Scene => "scene",
             Self::Patch => "scene.materials[…]",
+            Self::View => "view",
         }
     }
 
@@ -188,6 +201,7 @@ impl Section {
             (Self::Top, "camera") => Some(Self::Camera),
             (Self::Top, "framebuffer") => Some(Self::Framebuffer),
             (Self::Top, "scene") => Some(Self::Scene),
+            (Self::Top, "view") => Some(Self::View),
             (Self::Scene, "materials") => Some(Self::Patch),
             _ => None,
         }
@@ -230,6 +244,7 @@ impl Default for SceneConfig {
             estimator: Estimator::Unbiased,
             sampler: None,
             seed: None,
+            view: None,
             unmodelled: Vec::new(),
         }
     }
@@ -313,6 +328,7 @@ impl SceneConfig {
         config.estimator = top.or("estimator", config.estimator, |i| i.choice(&ESTIMATORS))?;
         config.sampler = top.opt("sampler", |i| i.text("a sampler, or one for each decision").map(str::to_owned))?;
         config.seed = top.opt("seed", |i| i.integer(0..=u64::MAX))?;
+        config.view = top.opt("view", ViewConfig::read)?;
         keep_rest(&mut top, Section::Top, kept)?;
         Ok(config)
     }
@@ -381,6 +397,7 @@ impl SceneConfig {
         let open = [
             self.sampler.as_ref().map(|sampler| ("sampler", Value::text(sampler))),
             self.seed.map(|seed| ("seed", Value::integer(seed))),
+            self.view.as_ref().map(|view| ("view", view.to_value())),
         ];
         let open = object(open.into_iter().flatten());
         Value::Object(top.chain(open).chain(kept(Section::Top)).collect())
@@ -732,6 +749,7 @@ mod tests {
                     estimator,
                     sampler: open.0,
                     seed: open.1,
+                    view: None,
                     unmodelled,
                 }
             },

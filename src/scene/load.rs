@@ -88,7 +88,7 @@ pub struct LoadedScene {
 
 impl LoadedScene {
     /// SHA-256, in hex, of everything that decides the picture but for what an experiment sets itself (size, samples,
-    /// exposure, estimator, sampler, seed): the full state, defaults and `--set` applied, and the other files' names and bytes. The
+    /// exposure, estimator, sampler, seed) and how the live view shows it: the full state, defaults and `--set` applied, and the other files' names and bytes. The
     /// scene file's own layout does not count.
     pub fn content_sha256(&self) -> String {
         let state = SceneConfig {
@@ -96,6 +96,7 @@ impl LoadedScene {
             estimator: Estimator::Unbiased,
             sampler: None,
             seed: None,
+            view: None,
             ..self.config.clone()
         };
         let mut text = state.to_json();
@@ -193,7 +194,6 @@ fn assemble(config: SceneConfig, inputs: Inputs, places: &[PathBuf], called: &st
         let key = format!("{called}: scene.mesh_files[{index}]");
         let path = find_mesh(name, places, &key)?;
         builder.add_file(index as u32, name, &path)?;
-        builder.check_triangles(name)?;
     }
     let Builder { mesh, inputs, painted, said, known, declared, .. } = builder;
     let (inputs, file_warnings) = (inputs.files, said);
@@ -343,9 +343,8 @@ impl Builder<'_> {
     }
 
     /// Whether there are no more triangles than there may be.
-    fn check_triangles(&self, name: &str) -> Result<()> {
-        let (most, found) = (self.inputs.within.as_ref().map(|within| within.limits.triangles), self.mesh.len());
-        match most {
+    fn check_triangles(&self, name: &str, found: usize) -> Result<()> {
+        match self.inputs.within.as_ref().map(|within| within.limits.triangles) {
             Some(most) if found > most => {
                 Err(Error::input(name, format!("expected at most {most} triangles in all here, found {found}")))
             }
@@ -367,10 +366,13 @@ impl Builder<'_> {
     /// Adds the triangles of all faces, part by part, in their order.
     fn add_faces(&mut self, obj: &Obj, file: u32, path: &Path) -> Result<()> {
         let name = &self.config.mesh_files[file as usize];
+        let most: usize = obj.faces.iter().map(Faces::most_triangles).sum();
+        // Before they take memory; those without area count here too.
+        self.check_triangles(name, self.mesh.len() + most)?;
         let normals: Vec<Option<Vec3>> = obj.normals.par_iter().map(|n| cut::unit(n.as_dvec3())).collect();
         let mut index_of: HashMap<Option<usize>, u32> = HashMap::new();
         let mut told = Told::default();
-        self.mesh.reserve(obj.faces.iter().map(Faces::most_triangles).sum());
+        self.mesh.reserve(most);
         // Some at a time, so that a large mesh is not there twice.
         for some in obj.faces.chunks(PARTS_AT_ONCE) {
             let parts: Vec<Triangles> = some.par_iter().map(|faces| cut::triangles(obj, faces, &normals)).collect();

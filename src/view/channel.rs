@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -47,6 +47,8 @@ pub struct Inbox {
     arrived: Condvar,
     /// Counts what makes the pictures under way stale.
     changes: AtomicU64,
+    /// How many requests wait.
+    count: AtomicUsize,
 }
 
 #[derive(Default)]
@@ -101,6 +103,7 @@ impl Inbox {
             _ if is_full => return false,
             (_, ask) => waiting.asks.push_back(ask),
         }
+        self.count.store(waiting.asks.len(), Ordering::Relaxed);
         self.arrived.notify_all();
         true
     }
@@ -122,6 +125,11 @@ impl Inbox {
         self.changes.load(Ordering::Relaxed)
     }
 
+    /// Whether a request waits.
+    pub fn has_asks(&self) -> bool {
+        self.count.load(Ordering::Relaxed) > 0
+    }
+
     /// Everything that waits. Waits up to `patience` for anything to come.
     pub fn take(&self, patience: Duration) -> Taken {
         let mut waiting = lock(&self.waiting);
@@ -131,6 +139,7 @@ impl Inbox {
             let waited = self.arrived.wait_timeout_while(waiting, patience, idle);
             waiting = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
+        self.count.store(0, Ordering::Relaxed);
         let asks = waiting.asks.drain(..).collect();
         Taken { asks, shown: waiting.shown, changes: self.changes(), sets: waiting.sets }
     }

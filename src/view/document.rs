@@ -8,7 +8,7 @@ use super::{MAX_VIEW_PIXELS, Options};
 use crate::error::{Error, Result};
 use crate::sampling::{Preset, SamplerSet};
 use crate::scene::compile::{Scene, Stage};
-use crate::scene::config::{SceneConfig, Shading};
+use crate::scene::config::{SceneConfig, Shading, ViewConfig};
 use crate::scene::load::{self, Limits, LoadedScene};
 use crate::scene::mesh::Mesh;
 
@@ -21,13 +21,15 @@ const SEED: u64 = 1;
 /// Triangles take about 250 bytes with their tree, texels 3 to 12: at most a gigabyte for each tab.
 const LIMITS: Limits = Limits { triangles: 1 << 22, texels: 1 << 26 };
 
-/// A scene file with sampler and seed made explicit.
+/// A scene file with sampler, seed and view made explicit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Document {
-    /// Everything a scene file says; sampler (in full) and seed are there.
+    /// Everything a scene file says; samplers (in full), seed and view are there.
     pub config: SceneConfig,
     /// The samplers.
     pub set: SamplerSet,
+    /// Those of a second picture, if there is one.
+    pub second: Option<SamplerSet>,
     /// The seed.
     pub seed: u64,
     /// Its file name, for messages and downloads.
@@ -78,8 +80,14 @@ impl Document {
     /// # Errors
     /// Kind `Input` for samplers that mean nothing, and more pixels than [`MAX_VIEW_PIXELS`].
     pub fn new(mut config: SceneConfig, name: &str, places: Vec<PathBuf>, folder: Option<PathBuf>) -> Result<Self> {
-        let set = SamplerSet::parse(config.sampler.as_deref().unwrap_or(SAMPLER), Preset::Best)
-            .map_err(|e| Error { place: format!("{name}: sampler: {}", e.place), ..e })?;
+        let samplers = |key: &str, text: &str| {
+            let named = |e: Error| Error { place: format!("{name}: {key}: {}", e.place), ..e };
+            SamplerSet::parse(text, Preset::Best).map_err(named)
+        };
+        let set = samplers("sampler", config.sampler.as_deref().unwrap_or(SAMPLER))?;
+        let view = config.view.get_or_insert_default();
+        let second = view.second.as_deref().map(|text| samplers("view.second", text)).transpose()?;
+        view.second = second.map(|set| set.to_string());
         let seed = config.seed.unwrap_or(SEED);
         let (w, h) = (config.framebuffer.res_w, config.framebuffer.res_h);
         if u64::from(w) * u64::from(h) > MAX_VIEW_PIXELS {
@@ -88,15 +96,25 @@ impl Document {
         }
         config.sampler = Some(set.to_string());
         config.seed = Some(seed);
-        Ok(Self { config, set, seed, name: name.to_owned(), places, folder, warnings: Vec::new() })
+        Ok(Self { config, set, second, seed, name: name.to_owned(), places, folder, warnings: Vec::new() })
     }
 
-    /// The same with `text` for its JSON, under another name: from the page, so that its meshes have to lie in our places.
+    /// How it is shown.
+    ///
+    /// # Panics
+    /// Never: a document's view is there.
+    pub fn view(&self) -> &ViewConfig {
+        self.config.view.as_ref().expect("made explicit with the document")
+    }
+
+    /// The same with `text` for its JSON, under another name: from the page, so that its meshes have to lie in our places. One without a
+    /// view is shown as this one is.
     ///
     /// # Errors
     /// Those of reading a scene file, and of [`Document::new`].
     pub fn with_text(&self, text: &[u8], name: &str) -> Result<Self> {
-        let config = SceneConfig::parse(text, name, &[])?;
+        let mut config = SceneConfig::parse(text, name, &[])?;
+        config.view = config.view.or_else(|| self.config.view.clone());
         Self::new(config, name, self.places.clone(), self.folder.clone())
     }
 
@@ -139,6 +157,7 @@ impl Document {
             let mut config = d.config.clone();
             config.sampler = None;
             config.seed = None;
+            config.view = None;
             config.estimator = crate::scene::config::Estimator::Unbiased;
             config.framebuffer.sppx = 1;
             config.framebuffer.exposure = 1.0;
@@ -147,10 +166,12 @@ impl Document {
         self.places == other.places && truth(self) == truth(other)
     }
 
-    /// Whether every sample is the same: at most the exposure differs.
+    /// Whether every sample is the same: only how it is shown differs ([`is_of_showing`](super::message::is_of_showing)).
     pub fn has_the_samples_of(&self, other: &Self) -> bool {
         let mut config = other.config.clone();
         config.framebuffer.exposure = self.config.framebuffer.exposure;
+        let ViewConfig { second, seconds, .. } = other.view().clone();
+        config.view = Some(ViewConfig { second, seconds, ..self.view().clone() });
         self.places == other.places && self.name == other.name && self.config == config
     }
 

@@ -16,11 +16,12 @@ const MAX_HEAD: usize = 16 << 10;
 const HEAD_TIME: Duration = Duration::from_secs(10);
 
 /// The page's files: path, type, content.
-const FILES: [(&str, &str, &str); 10] = [
+const FILES: [(&str, &str, &str); 11] = [
     ("/", "text/html; charset=utf-8", include_str!("page/index.html")),
     ("/view.css", "text/css; charset=utf-8", include_str!("page/view.css")),
     ("/view.js", "text/javascript; charset=utf-8", include_str!("page/view.js")),
     ("/link.js", "text/javascript; charset=utf-8", include_str!("page/link.js")),
+    ("/comparison.js", "text/javascript; charset=utf-8", include_str!("page/comparison.js")),
     ("/controls.js", "text/javascript; charset=utf-8", include_str!("page/controls.js")),
     ("/samplers.js", "text/javascript; charset=utf-8", include_str!("page/samplers.js")),
     ("/camera.js", "text/javascript; charset=utf-8", include_str!("page/camera.js")),

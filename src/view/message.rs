@@ -5,7 +5,7 @@
 
 use std::path::PathBuf;
 
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 use crate::error::{Error, Result};
 
@@ -52,25 +52,6 @@ pub enum Ask {
     Restart {},
     /// Stop rendering; a restart or any change goes on.
     Stop {},
-    /// Show another view.
-    Look {
-        /// Which.
-        view: View,
-    },
-    /// Render a second sampler beside the document's, or no longer; and what both may take.
-    Compare {
-        /// The second one's samplers; absent for none.
-        #[serde(default)]
-        other: Option<String>,
-        /// Seconds of rendering each; absent: the document's samples a pixel.
-        #[serde(default)]
-        seconds: Option<f64>,
-    },
-    /// Whether the reference is refined.
-    Reference {
-        /// Whether.
-        on: bool,
-    },
     /// A frame was shown.
     Shown {
         /// Its number.
@@ -123,19 +104,12 @@ pub enum Download {
     Exr,
 }
 
-/// What is shown of a panel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, Default)]
-#[serde(rename_all = "kebab-case")]
-pub enum View {
-    /// The picture.
-    #[default]
-    Image,
-    /// The reference.
-    Reference,
-    /// Picture minus reference, in luminance.
-    Error,
-    /// The variance of each pixel's mean, as if its samples were independent.
-    Variance,
+/// Keys of the document that change what is shown of the samples, and none of these.
+const OF_SHOWING: [&str; 5] = ["framebuffer.exposure", "view.show", "view.look", "view.refine", "view.speed"];
+
+/// Whether a set (`KEY=VALUE`) changes nothing but what is shown.
+pub fn is_of_showing(set: &str) -> bool {
+    set.split_once('=').is_some_and(|(key, _)| OF_SHOWING.contains(&key))
 }
 
 impl Ask {
@@ -144,28 +118,19 @@ impl Ask {
     /// # Errors
     /// Kind `Input` for anything else.
     pub fn parse(text: &str) -> Result<Self> {
-        let ask: Self = serde_json::from_str(text)
-            .map_err(|e| Error::input("message", format!("expected a request of the page, found: {e}")))?;
-        match &ask {
-            Self::Compare { seconds: Some(s), .. } if !(0.1..=3600.0).contains(s) => {
-                Err(Error::input("budget", format!("expected 0.1 to 3600 seconds, found {s}")))
-            }
-            _ => Ok(ask),
-        }
+        serde_json::from_str(text)
+            .map_err(|e| Error::input("message", format!("expected a request of the page, found: {e}")))
     }
 
     /// Whether what is under way is stale with it.
     pub fn is_change(&self) -> bool {
         if let Self::Set { sets, .. } = self {
-            // The exposure changes what is shown of the samples, and none of these.
-            return sets.iter().any(|set| !set.starts_with("framebuffer.exposure="));
+            return !sets.iter().all(|set| is_of_showing(set));
         }
         !matches!(
             self,
             Self::Save { .. }
                 | Self::Download { .. }
-                | Self::Look { .. }
-                | Self::Reference { .. }
                 | Self::Shown { .. }
                 | Self::Probe { .. }
                 | Self::Pick { .. }
@@ -228,12 +193,19 @@ mod tests {
             r#"{"ask":"dropped","folder":"/etc","names":["passwd"]}"#,
             r#"{"ask":"probe","x":-1,"y":0}"#,
             r#"{"ask":"probe","x":1,"y":0,"z":0}"#,
-            r#"{"ask":"compare","seconds":0}"#,
-            r#"{"ask":"compare","seconds":1e9}"#,
-            r#"{"ask":"look","view":"everything"}"#,
+            r#"{"ask":"look","view":"error"}"#,
         ] {
             assert_eq!(Ask::parse(bad).unwrap_err().exit_code(), 2, "{bad}");
         }
+    }
+
+    #[test]
+    fn what_is_only_shown_makes_no_sample_stale() {
+        let set = |sets: &[&str]| Ask::Set { sets: sets.iter().map(|s| (*s).to_owned()).collect(), moving: false };
+        assert!(!set(&["view.look=\"error\"", "framebuffer.exposure=2"]).is_change());
+        assert!(set(&["view.look=\"error\"", "view.second=\"ld\""]).is_change());
+        assert!(set(&["camera.fov=40"]).is_change() && set(&["view"]).is_change());
+        assert!(Ask::Reset {}.is_change() && !Ask::Spectrum {}.is_change());
     }
 
     #[test]

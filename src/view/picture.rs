@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::message::View;
 use crate::film::{Image, ScreenTable};
 use crate::render::Growing;
 use crate::report::pictures::error_map;
+use crate::scene::config::Look;
 
 /// Decades of variance that the map's colours span.
 const DECADES: f64 = 4.0;
@@ -18,14 +18,14 @@ pub struct Shown {
     pub height: u32,
     /// `3 · width · height` bytes.
     pub bytes: Vec<u8>,
-    /// What it is a view of: the picture where another could not be had yet.
-    pub view: View,
+    /// What is shown: the picture where another could not be had yet.
+    pub look: Look,
     /// The number at the end of the scale, where colours stand for numbers.
     pub scale: Option<f64>,
 }
 
 /// A picture on the screen's curve.
-pub fn on_screen(image: &Image, table: &ScreenTable, view: View) -> Shown {
+pub fn on_screen(image: &Image, table: &ScreenTable, look: Look) -> Shown {
     let mut bytes = vec![0u8; image.pixels.len() * 3];
     let row = image.width as usize;
     bytes.par_chunks_mut(3 * row).zip(image.pixels.par_chunks(row)).for_each(|(bytes, pixels)| {
@@ -33,7 +33,7 @@ pub fn on_screen(image: &Image, table: &ScreenTable, view: View) -> Shown {
             *byte = table.code(c);
         }
     });
-    Shown { width: image.width, height: image.height, bytes, view, scale: None }
+    Shown { width: image.width, height: image.height, bytes, look, scale: None }
 }
 
 /// Picture minus reference in luminance, full colour at ±`scale`; the picture alone where that is no number above 0.
@@ -41,9 +41,9 @@ pub fn error(growing: &Growing, reference: &Image, scale: f64, table: &ScreenTab
     let image = growing.image();
     match error_map(&image, reference, scale) {
         Ok(map) => {
-            Shown { width: map.width, height: map.height, bytes: map.bytes, view: View::Error, scale: Some(scale) }
+            Shown { width: map.width, height: map.height, bytes: map.bytes, look: Look::Error, scale: Some(scale) }
         }
-        Err(_) => on_screen(&image, table, View::Image),
+        Err(_) => on_screen(&image, table, Look::Image),
     }
 }
 
@@ -67,7 +67,7 @@ pub fn variance(growing: &Growing) -> Option<Shown> {
         let share = if scale > 0.0 && value > 0.0 { 1.0 + libm::log10(value / scale) / DECADES } else { 0.0 };
         rgb.copy_from_slice(&heat(share));
     });
-    Some(Shown { width, height, bytes, view: View::Variance, scale: Some(scale) })
+    Some(Shown { width, height, bytes, look: Look::Variance, scale: Some(scale) })
 }
 
 /// Black, red, yellow, white at 0, 1/3, 2/3, 1, linear between: lighter is more, also in grey.

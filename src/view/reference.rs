@@ -47,16 +47,16 @@ impl Reference {
         self.halves.iter().all(Side::is_finished)
     }
 
-    /// Adds a pass to the half that is behind, with the estimator that is right. A change stops it, and it has to be begun anew.
+    /// Adds a pass to the half that is behind, with the estimator that is right.
     ///
     /// # Errors
     /// A sample that is no number.
-    pub fn grow(&mut self, scene: &mut Scene, speed: &Speed, go_on: &(dyn Fn() -> bool + Sync)) -> Traced {
+    pub fn grow(&mut self, scene: &mut Scene, speed: &mut Speed, go_on: &(dyn Fn() -> bool + Sync)) -> Traced {
         let [a, b] = &mut self.halves;
         let half = if a.growing.samples() <= b.growing.samples() { a } else { b };
         let estimator = std::mem::replace(&mut scene.estimator, Estimator::Unbiased);
         let step = match half.growing.samples() {
-            0 => half.first(scene, 1, go_on),
+            0 => half.first(scene, 1, speed, go_on),
             _ => half.grow(scene, speed, go_on),
         };
         scene.estimator = estimator;

@@ -94,6 +94,7 @@ fn listen(stream: TcpStream, house: &House, outbox: &Outbox, inbox: &Inbox, uplo
                 outbox.say(
                     &json!({"is": "refused", "text": format!("message: expected one of bounded size, found: {e}")}),
                 );
+                drain(socket.get_mut());
                 break;
             }
             Err(_) => break,
@@ -107,6 +108,21 @@ fn listen(stream: TcpStream, house: &House, outbox: &Outbox, inbox: &Inbox, uplo
             }
             Ok(None) => {}
             Err(e) => say_error(outbox, &e.to_string()),
+        }
+    }
+}
+
+/// Lets a tab say the rest of what is not listened to, for some seconds: a connection that is closed on it would take back what the tab
+/// was told.
+fn drain(stream: &mut impl std::io::Read) {
+    let (started, mut heard) = (Instant::now(), Instant::now());
+    let mut rest = vec![0u8; 64 << 10];
+    while started.elapsed() < Duration::from_secs(10) && heard.elapsed() < Duration::from_secs(1) {
+        match stream.read(&mut rest) {
+            Ok(0) => break,
+            Ok(_) => heard = Instant::now(),
+            Err(e) if matches!(e.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) => {}
+            Err(_) => break,
         }
     }
 }

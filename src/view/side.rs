@@ -1,6 +1,6 @@
 //! The picture of one sampler on its budget.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::speed::Speed;
 use crate::error::Result;
@@ -36,22 +36,14 @@ pub struct Side {
     pub sampler: Sampler,
     /// The picture so far.
     pub growing: Growing,
-    /// Seconds of rendering that are in it.
+    /// Seconds of rendering that are in it, and how many samples of pixels these took.
     pub seconds: f64,
+    traced: u64,
     phase: Phase,
 }
 
-/// What a step came to.
-#[derive(Debug, PartialEq)]
-pub enum Step {
-    /// More of the picture is there: samples, rays, and how long it took.
-    Grown(u64, u64, Duration),
-    /// A change came in between.
-    Stale,
-}
-
-/// A step, or a sample that is no number.
-pub type Traced = std::result::Result<Step, NonFinite>;
+/// Whether there is more to be seen, or a sample that is no number.
+pub type Traced = std::result::Result<bool, NonFinite>;
 
 impl Side {
     /// A picture that has not begun, in the memory of an `old` one. `asked` samples a pixel are those of the scene file.
@@ -73,7 +65,7 @@ impl Side {
         let sampler = Sampler::new(set, &scene.layout, asked, seed)?;
         let mut growing = old.map_or_else(|| Growing::new(scene.camera.size()), |old| old.growing);
         growing.clear(scene.camera.size());
-        Ok(Self { set, seed, budget, sampler, growing, seconds: 0.0, phase })
+        Ok(Self { set, seed, budget, sampler, growing, seconds: 0.0, traced: 0, phase })
     }
 
     /// Whether every sample is there.
@@ -86,47 +78,37 @@ impl Side {
         self.phase == Phase::Timing
     }
 
-    /// Shows the first sample of one pixel in each block; never stopped by a change, as it takes little and something has to be shown while
-    /// the camera moves.
+    /// Traces the first sample of one pixel in each block.
     ///
     /// # Errors
     /// A sample that is no number.
-    pub fn first(&mut self, scene: &Scene, block: u32, go_on: &(dyn Fn() -> bool + Sync)) -> Traced {
-        let known = self.growing.block();
-        let (w, h) = scene.camera.size();
-        let count = |side: u32| u64::from(w.div_ceil(side)) * u64::from(h.div_ceil(side));
-        let samples = count(block) - known.map_or(0, count);
+    pub fn first(&mut self, scene: &Scene, block: u32, speed: &mut Speed, go_on: &(dyn Fn() -> bool + Sync)) -> Traced {
         let started = Instant::now();
         let pass = self.growing.begin(scene, &self.sampler, block, go_on)?;
-        Ok(self.after(pass, samples, started.elapsed()))
+        self.after(&pass, started, speed);
+        Ok(pass.is_whole)
     }
 
     /// Adds the samples that fit into a pass.
     ///
     /// # Errors
     /// A sample that is no number.
-    pub fn grow(&mut self, scene: &Scene, speed: &Speed, go_on: &(dyn Fn() -> bool + Sync)) -> Traced {
+    pub fn grow(&mut self, scene: &Scene, speed: &mut Speed, go_on: &(dyn Fn() -> bool + Sync)) -> Traced {
         let (w, h) = scene.camera.size();
         let pixels = u64::from(w) * u64::from(h);
         let done = self.growing.samples();
         let to = done.saturating_add(speed.samples_of_a_pass(pixels)).min(self.sampler.samples());
         let started = Instant::now();
         let pass = self.growing.add(scene, &self.sampler, to, go_on)?;
-        Ok(self.after(pass, pixels * u64::from(to - done), started.elapsed()))
+        self.after(&pass, started, speed);
+        Ok(pass.samples > 0)
     }
 
-    fn after(&mut self, pass: Pass, samples: u64, took: Duration) -> Step {
-        match pass {
-            // The picture has no sample again.
-            Pass::Stopped => {
-                self.seconds = 0.0;
-                Step::Stale
-            }
-            Pass::Added { rays } => {
-                self.seconds += took.as_secs_f64();
-                Step::Grown(samples, rays, took)
-            }
-        }
+    fn after(&mut self, pass: &Pass, started: Instant, speed: &mut Speed) {
+        let took = started.elapsed();
+        self.seconds += took.as_secs_f64();
+        self.traced += pass.samples;
+        speed.traced(pass.samples, pass.rays, took);
     }
 
     /// Chooses the count of a budget of seconds, once enough is known; the picture then begins anew with a sampler of that count.
@@ -136,17 +118,19 @@ impl Side {
     pub fn choose_count(&mut self, scene: &Scene) -> Result<()> {
         let (Budget::Seconds(budget), Phase::Timing) = (self.budget, self.phase) else { return Ok(()) };
         let done = self.growing.samples();
+        let (w, h) = self.growing.size();
         let knows = done >= 2 && (self.seconds >= (budget / 4.0).min(0.3) || done >= self.sampler.samples());
         if !knows && done < self.sampler.samples() {
             return Ok(());
         }
-        let most = (budget / (self.seconds / f64::from(done.max(1)))).clamp(1.0, f64::from(MAX_SAMPLES)) as u32;
+        let per_pixel = self.traced.max(1) as f64 / (f64::from(w) * f64::from(h));
+        let most = (budget / self.seconds.max(1e-9) * per_pixel).clamp(1.0, f64::from(MAX_SAMPLES)) as u32;
         // The largest count that is not above what fits: sets of strata take others than asked.
         let fits = |asked: &u32| self.set.taken(*asked, &scene.layout) <= most;
         let asked = (1..=most).rev().take(1000).find(fits).unwrap_or(1);
         self.sampler = Sampler::new(self.set, &scene.layout, asked, self.seed)?;
         self.growing.clear(scene.camera.size());
-        self.seconds = 0.0;
+        (self.seconds, self.traced) = (0.0, 0);
         self.phase = Phase::Final;
         Ok(())
     }

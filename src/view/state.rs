@@ -6,7 +6,7 @@ use glam::Vec3;
 use serde_json::{Map, Value, json};
 
 use super::document::Document;
-use super::{MAX_VIEW_PIXELS, document};
+use super::{MAX_UPLOAD_BYTES, MAX_UPLOAD_FILES, MAX_VIEW_PIXELS, document};
 use crate::sampling::{Decision, MAX_SAMPLES, Points, Preset, SamplerSet, SamplerSpec, every_legal_spec};
 use crate::scene::compile::Scene;
 use crate::scene::load::LoadedScene;
@@ -27,6 +27,7 @@ pub fn vocabulary(can_save: bool) -> Value {
     json!({
         "is": "hello", "version": env!("CARGO_PKG_VERSION"), "presets": presets, "legal": legal, "decisions": decisions,
         "most_pixels": MAX_VIEW_PIXELS, "most_samples": MAX_SAMPLES, "can_save": can_save,
+        "most_files": MAX_UPLOAD_FILES, "most_bytes": MAX_UPLOAD_BYTES,
     })
 }
 

@@ -9,22 +9,25 @@ use super::House;
 use super::analyst::{self, Analyst, SharedFigures};
 use super::channel::{Inbox, Outbox, Shown, Taken};
 use super::document::Document;
-use super::message::View;
 use super::picture;
 use super::reference::Reference;
-use super::side::{Budget, Side, Step, Traced};
+use super::side::{Budget, Side, Traced};
 use super::speed::Speed;
 use super::state;
 use crate::error::{Error, Result};
 use crate::film::ScreenTable;
-use crate::sampling::{PointSource, Preset, Sampler, SamplerSet};
+use crate::sampling::{PointSource, Sampler};
 use crate::scene::compile::{Scene, Stage, Tree};
+use crate::scene::config::{Look, ViewConfig};
 use crate::scene::load::LoadedScene;
 
 mod answers;
 
 /// After so long without a change the camera rests: the reference grows, and the tree becomes the one of `render`.
 const REST: Duration = Duration::from_millis(300);
+
+/// Longest piece of work on every pixel: then one looks whether there is something to show or to tell.
+const SLICE: Duration = Duration::from_millis(100);
 
 /// Shortest time between two pictures of one that only grows.
 const BETWEEN_FRAMES: Duration = Duration::from_millis(120);
@@ -42,13 +45,6 @@ struct Open {
     scene: Scene,
 }
 
-/// Two samplers side by side.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Comparison {
-    other: Option<SamplerSet>,
-    seconds: Option<f64>,
-}
-
 /// A tab's worker.
 pub struct Studio {
     house: Arc<House>,
@@ -56,16 +52,13 @@ pub struct Studio {
     outbox: Arc<Outbox>,
     /// Absent where not even the first document could be opened again.
     open: Option<Open>,
-    comparison: Comparison,
     sides: Vec<Side>,
     reference: Option<Reference>,
-    refines: bool,
     /// Whether something was asked for that only a reference can tell: its first samples come first then.
     wants_truth: bool,
     stopped: bool,
     /// A sample that is no number, which ends the picture.
     broken: Option<String>,
-    view: View,
     table: ScreenTable,
     exposure: f32,
     speed: Speed,
@@ -84,7 +77,8 @@ pub struct Studio {
     figures: SharedFigures,
     figured: Instant,
     measurer: Analyst,
-    errands: Analyst,
+    /// For points, a spectrum, a file: one of each at a time.
+    errands: [Analyst; 3],
     told: Instant,
     /// What was last told of how far it is.
     last_status: Value,
@@ -113,14 +107,11 @@ impl Studio {
             inbox,
             outbox,
             open: None,
-            comparison: Comparison::default(),
             sides: Vec::new(),
             reference: None,
-            refines: true,
             wants_truth: false,
             stopped: false,
             broken: None,
-            view: View::Image,
             table: ScreenTable::new(crate::film::DEFAULT_EXPOSURE),
             exposure: crate::film::DEFAULT_EXPOSURE,
             speed: Speed::default(),
@@ -134,7 +125,7 @@ impl Studio {
             figures: SharedFigures::default(),
             figured: now,
             measurer: Analyst::default(),
-            errands: Analyst::default(),
+            errands: Default::default(),
             told: now,
             last_status: Value::Null,
         }
@@ -161,6 +152,10 @@ impl Studio {
                 }
             }
             self.work();
+            if !self.show.is_urgent && self.inbox.changes() != self.seen {
+                // What could be shown is of before the change, and would be in the way of what comes after it.
+                continue;
+            }
             self.show();
             self.figure();
             self.tell(false);
@@ -194,12 +189,16 @@ impl Studio {
         self.is_exact() && self.sides.iter().all(Side::is_finished)
     }
 
+    fn view(&self) -> &ViewConfig {
+        self.open.as_ref().map_or(&self.house.first, |open| &open.document).view()
+    }
+
     fn rests(&self) -> bool {
         self.changed.elapsed() >= REST
     }
 
     fn wants_reference(&self) -> bool {
-        self.refines && self.reference.as_ref().is_none_or(|reference| !reference.is_finished())
+        self.view().refine && self.reference.as_ref().is_none_or(|reference| !reference.is_finished())
     }
 
     /// Does one piece of work, of tens of milliseconds.
@@ -213,12 +212,7 @@ impl Studio {
         let outcome = self.step();
         self.passes += 1;
         match outcome {
-            Ok(Step::Grown(samples, rays, took)) => {
-                self.speed.traced(samples, rays, took);
-                self.show.is_stale = true;
-            }
-            // The change that came in between waits in the inbox; where it is refused, the picture that was stopped begins anew.
-            Ok(Step::Stale) => {}
+            Ok(has_grown) => self.show.is_stale |= has_grown,
             Err(bad) => {
                 self.broken = Some(bad.to_string());
                 self.outbox.say(&json!({"is": "error", "text": format!("rendering stopped: {bad}")}));
@@ -237,30 +231,42 @@ impl Studio {
         self.begin(false)
     }
 
-    /// The most urgent piece: a first picture, then all pixels, then more samples of whoever is behind, then the reference.
+    /// The most urgent piece: a first picture, then all pixels, then more samples of whoever is behind, then the reference. What comes in
+    /// between stops it, and nothing is lost by that: a request that is refused leaves no trace.
     fn step(&mut self) -> Traced {
-        let (inbox, seen) = (self.inbox.clone(), self.seen);
-        let fresh = move || inbox.changes() == seen;
-        if let Some(step) = self.first_pictures(&fresh) {
+        let (inbox, seen, started) = (self.inbox.clone(), self.seen, Instant::now());
+        let is_current = || inbox.changes() == seen;
+        if let Some(step) = self.first_blocks(&is_current) {
+            return step;
+        }
+        let goes_on = || !inbox.has_asks() && is_current() && started.elapsed() < SLICE;
+        if let Some(step) = self.first_samples(&goes_on) {
             return step;
         }
         self.show.is_urgent = false;
-        if self.is_turn_of_reference() { self.grow_reference(&fresh) } else { self.grow_sides(&fresh) }
+        if self.is_turn_of_reference() { self.grow_reference(&goes_on) } else { self.grow_sides(&goes_on) }
     }
 
-    /// The first sample: of one pixel in each block, of blocks half as large, at last of every pixel; `None` where that is done.
-    fn first_pictures(&mut self, fresh: &(dyn Fn() -> bool + Sync)) -> Option<Traced> {
+    /// The first sample of one pixel in each block, then of blocks half as large; `None` where blocks are pixels. The very first is not stopped
+    /// by a change: it takes little, and something has to be shown while the camera moves.
+    fn first_blocks(&mut self, is_current: &(dyn Fn() -> bool + Sync)) -> Option<Traced> {
         let scene = &self.open.as_ref()?.scene;
         let (w, h) = scene.camera.size();
         let panels = self.sides.len();
         if let Some(side) = self.sides.iter_mut().find(|side| side.growing.block().is_none()) {
             let block = self.speed.first_block(u64::from(w) * u64::from(h), panels);
-            return Some(side.first(scene, block, &|| true));
+            return Some(side.first(scene, block, &mut self.speed, &|| true));
         }
-        let unfinished = self.sides.iter_mut().filter(|side| side.growing.block() > Some(1));
-        let side = unfinished.max_by_key(|side| side.growing.block())?;
-        let block = side.growing.block()? / 2;
-        Some(side.first(scene, block, fresh))
+        let coarsest = self.sides.iter_mut().max_by_key(|side| side.growing.block())?;
+        let block = coarsest.growing.block().filter(|&block| block > 2)?;
+        Some(coarsest.first(scene, block / 2, &mut self.speed, is_current))
+    }
+
+    /// The first sample of every pixel; `None` where that is done.
+    fn first_samples(&mut self, goes_on: &(dyn Fn() -> bool + Sync)) -> Option<Traced> {
+        let scene = &self.open.as_ref()?.scene;
+        let side = self.sides.iter_mut().find(|side| side.growing.block() > Some(1))?;
+        Some(side.first(scene, 1, &mut self.speed, goes_on))
     }
 
     /// While pictures are made, the reference takes a quarter of the passes of a camera that rests, half where it is looked at.
@@ -276,32 +282,32 @@ impl Studio {
         self.sides.iter().all(Side::is_finished) || (is_due && !self.sides.iter().any(Side::is_timing))
     }
 
-    fn grow_reference(&mut self, fresh: &(dyn Fn() -> bool + Sync)) -> Traced {
-        let Some(open) = self.open.as_mut() else { return Ok(Step::Stale) };
+    fn grow_reference(&mut self, goes_on: &(dyn Fn() -> bool + Sync)) -> Traced {
+        let Some(open) = self.open.as_mut() else { return Ok(false) };
         let reference = match &mut self.reference {
             Some(reference) => reference,
             none => match Reference::new(&open.scene, None) {
                 Ok(reference) => none.insert(reference),
-                Err(_) => return Ok(Step::Stale),
+                Err(_) => return Ok(false),
             },
         };
-        reference.grow(&mut open.scene, &self.speed, fresh)
+        reference.grow(&mut open.scene, &mut self.speed, goes_on)
     }
 
     /// Adds samples to the picture that has taken less time so far.
-    fn grow_sides(&mut self, fresh: &(dyn Fn() -> bool + Sync)) -> Traced {
-        let Some(open) = self.open.as_ref() else { return Ok(Step::Stale) };
+    fn grow_sides(&mut self, goes_on: &(dyn Fn() -> bool + Sync)) -> Traced {
+        let Some(open) = self.open.as_ref() else { return Ok(false) };
         let unfinished = self.sides.iter_mut().filter(|side| !side.is_finished());
-        let Some(side) = unfinished.min_by(|a, b| a.seconds.total_cmp(&b.seconds)) else { return Ok(Step::Stale) };
-        let step = match side.growing.samples() < side.sampler.samples() {
-            true => side.grow(&open.scene, &self.speed, fresh)?,
+        let Some(side) = unfinished.min_by(|a, b| a.seconds.total_cmp(&b.seconds)) else { return Ok(false) };
+        let grown = match side.growing.samples() < side.sampler.samples() {
+            true => side.grow(&open.scene, &mut self.speed, goes_on)?,
             // Of one sample alone, whose time is known already.
-            false => Step::Stale,
+            false => false,
         };
         if side.is_timing() && side.choose_count(&open.scene).is_err() {
-            return Ok(Step::Stale);
+            return Ok(false);
         }
-        Ok(step)
+        Ok(grown)
     }
 
     /// Opens another document in place of the one that is open, which stays on an error.
@@ -313,8 +319,12 @@ impl Studio {
         let keeps_truth = self.open.as_ref().is_some_and(|open| open.document.has_the_truth_of(&document));
         if let Some(open) = self.open.as_mut().filter(|open| same_meshes && open.document.has_the_samples_of(&document))
         {
+            let looked_for = open.document.view().look;
             open.document = document;
             self.expose();
+            if looked_for != self.view().look {
+                self.wants_truth = matches!(self.view().look, Look::Reference | Look::Error);
+            }
             // Also where nothing of it is seen: the page then knows that what it shows is up to date.
             self.show.is_stale = true;
             self.tell_state(moving);
@@ -326,25 +336,30 @@ impl Studio {
             let mut loaded = document.open()?;
             let scene = document.compile(&mut loaded)?;
             let open = Open { document, loaded, scene };
-            check_samplers(&open, &self.comparison)?;
+            check_samplers(&open)?;
             self.open = Some(open);
-            self.stopped = false;
         }
+        self.stopped = false;
         self.changed = Instant::now();
         self.begin(keeps_truth)?;
+        self.wants_truth = matches!(self.view().look, Look::Reference | Look::Error);
         self.tell_state(moving);
         Ok(())
     }
 
-    /// The same meshes under another config.
+    /// The same meshes under another config; on an error everything is as it was, and the pictures go on.
     fn revise(&mut self, document: Document, moving: bool) -> Result<()> {
         let Some(open) = self.open.as_mut() else { return Ok(()) };
-        let tree = if moving { Tree::Roomy } else { Tree::Exact };
+        let as_it_was = if open.scene.has_exact_tree() { Tree::Exact } else { Tree::Roomy };
         let old = std::mem::replace(&mut open.document, document);
-        let tried = open.take(tree).and_then(|()| check_samplers(open, &self.comparison));
+        let tried = open.take(if moving { Tree::Roomy } else { Tree::Exact }).and_then(|()| check_samplers(open));
         if let Err(e) = tried {
             open.document = old;
-            open.take(Tree::Exact)?;
+            open.take(as_it_was)?;
+            if as_it_was == Tree::Roomy {
+                // The tree may be another now, and its picture would begin anew soon anyway.
+                self.begin(false)?;
+            }
             return Err(e);
         }
         Ok(())
@@ -353,7 +368,7 @@ impl Studio {
     /// Begins the pictures anew; the reference too, unless it still is the truth.
     fn begin(&mut self, keeps_reference: bool) -> Result<()> {
         let Some(open) = self.open.as_ref() else { return Ok(()) };
-        self.sides = sides(open, &self.comparison, &mut self.sides)?;
+        self.sides = sides(open, &mut self.sides)?;
         let whole = self.reference.as_ref().is_none_or(|r| r.size() == open.scene.camera.size());
         if !keeps_reference || !whole {
             self.reference = match self.reference.take() {
@@ -396,19 +411,20 @@ impl Studio {
         }
         let scale = self.current_figures().and_then(|figures| figures.error_scale);
         // One reference for all panels.
-        let wants_reference = matches!(self.view, View::Reference | View::Error);
+        let look = self.view().look;
+        let wants_reference = matches!(look, Look::Reference | Look::Error);
         let reference = self.reference.as_ref().filter(|_| wants_reference).and_then(Reference::image);
         let shown: Vec<picture::Shown> = self
             .sides
             .iter()
-            .map(|side| match (self.view, &reference, scale) {
-                (View::Reference, Some(reference), _) => picture::on_screen(reference, &self.table, View::Reference),
-                (View::Error, Some(reference), Some(scale)) if side.growing.samples() > 0 => {
+            .map(|side| match (look, &reference, scale) {
+                (Look::Reference, Some(reference), _) => picture::on_screen(reference, &self.table, Look::Reference),
+                (Look::Error, Some(reference), Some(scale)) if side.growing.samples() > 0 => {
                     picture::error(&side.growing, reference, scale, &self.table)
                 }
-                (View::Variance, ..) => picture::variance(&side.growing)
-                    .unwrap_or_else(|| picture::on_screen(&side.growing.preview(), &self.table, View::Image)),
-                _ => picture::on_screen(&side.growing.preview(), &self.table, View::Image),
+                (Look::Variance, ..) => picture::variance(&side.growing)
+                    .unwrap_or_else(|| picture::on_screen(&side.growing.preview(), &self.table, Look::Image)),
+                _ => picture::on_screen(&side.growing.preview(), &self.table, Look::Image),
             })
             .collect();
         self.show.sent += 1;
@@ -423,7 +439,7 @@ impl Studio {
     fn frame_header(&self, side: &Side, shown: &picture::Shown) -> Value {
         let (w, h) = side.growing.size();
         json!({
-            "width": shown.width, "height": shown.height, "full": [w, h], "view": shown.view, "scale": shown.scale,
+            "width": shown.width, "height": shown.height, "full": [w, h], "view": shown.look.name(), "scale": shown.scale,
             "samples": side.growing.samples(), "of": side.sampler.samples(), "block": side.growing.block(),
             "sampler": side.set.to_string(), "seconds": side.seconds, "timing": side.is_timing(),
             "reference": self.reference.as_ref().map_or(0, Reference::samples),
@@ -450,7 +466,7 @@ impl Studio {
         self.figured = Instant::now();
         self.measurer.start(move || analyst::figures(epoch, &panels, &halves, samples, &shared));
         // A map of errors has its scale from these.
-        self.show.is_stale |= self.view == View::Error;
+        self.show.is_stale |= self.view().look == Look::Error;
     }
 
     fn tell_state(&mut self, moving: bool) {
@@ -497,17 +513,6 @@ impl Studio {
         }
         self.told = Instant::now();
     }
-
-    /// Takes another sampler beside the document's, or another budget.
-    fn compare(&mut self, other: Option<&str>, seconds: Option<f64>) -> Result<()> {
-        let other = other.map(|text| SamplerSet::parse(text, Preset::Best)).transpose()?;
-        let comparison = Comparison { other, seconds };
-        if let Some(open) = &self.open {
-            check_samplers(open, &comparison)?;
-        }
-        self.comparison = comparison;
-        self.begin(true)
-    }
 }
 
 impl Open {
@@ -521,17 +526,17 @@ impl Open {
 }
 
 /// Whether the samplers serve the scene.
-fn check_samplers(open: &Open, comparison: &Comparison) -> Result<()> {
+fn check_samplers(open: &Open) -> Result<()> {
     let asked = open.document.config.framebuffer.sppx;
-    let mut sets = std::iter::once(open.document.set).chain(comparison.other);
+    let mut sets = std::iter::once(open.document.set).chain(open.document.second);
     sets.try_for_each(|set| Sampler::new(set, &open.scene.layout, asked, open.document.seed).map(|_| ()))
 }
 
 /// Pictures that have not begun, in the memory of old ones.
-fn sides(open: &Open, comparison: &Comparison, old: &mut Vec<Side>) -> Result<Vec<Side>> {
+fn sides(open: &Open, old: &mut Vec<Side>) -> Result<Vec<Side>> {
     let asked = open.document.config.framebuffer.sppx;
-    let budget = comparison.seconds.map_or(Budget::Samples(asked), Budget::Seconds);
-    let sets = std::iter::once(open.document.set).chain(comparison.other);
+    let budget = open.document.view().seconds.map_or(Budget::Samples(asked), Budget::Seconds);
+    let sets = std::iter::once(open.document.set).chain(open.document.second);
     let mut memory = std::mem::take(old).into_iter();
     sets.map(|set| Side::new(set, open.document.seed, budget, asked, &open.scene, memory.next())).collect()
 }

@@ -118,7 +118,7 @@ const CONTRAST: &str = r#"
 
 const FOCUS: &str = r#"
   const before = document.activeElement;
-  for (const control of document.querySelectorAll("header a[href], header select, .viewer button, .viewer select, .viewer input, .viewer summary, .stage, main a[href]")) {
+  for (const control of document.querySelectorAll("a[href], button, select, input, summary, [tabindex='0']")) {
     if (!control.checkVisibility() || control.disabled) continue;
     control.focus({ focusVisible: true });
     const style = getComputedStyle(control);

@@ -144,6 +144,15 @@ fn the_page_shows_what_render_makes_of_its_document_however_it_is_driven() {
     page.wait_for("/Distance [\\d.]+, depth [\\d.]+: \\w+/.test(document.querySelector('#picked').textContent)");
     page.key("p");
     page.wait_for("document.querySelector('#points-out').textContent.includes('star discrepancy D*')");
+    // By keys: the ring moves, and the points are those of its pixel.
+    let ringed = || page.evaluate("document.querySelector('#pixel-place').textContent");
+    let before_step = ringed();
+    page.key("l");
+    page.key("k");
+    page.wait_for(&format!("document.querySelector('#pixel-place').textContent !== {before_step}"));
+    page.wait_for("document.querySelector('.panel-a .mark').checkVisibility()");
+    page.key("p");
+    page.wait_for("document.querySelector('#points-out').textContent.includes(`Pixel ${document.querySelector('#pixel-place').textContent}`)");
     // Escape stops, space goes on.
     page.key("Escape");
     page.wait_for("document.body.dataset.state === 'stopped'");
@@ -190,6 +199,14 @@ fn a_downloaded_config_that_is_dropped_again_is_the_same_picture() {
     drop_file(&page, "broken.json", "{\"camera\": {\"fvo\": 3}}");
     page.wait_for("document.querySelector('#message').textContent.includes('did you mean \"fov\"')");
     assert!(shown(&page, "#screen-a") == picture);
+    // One that the program would not take is not even sent.
+    page.evaluate(
+        "(() => { const t = new DataTransfer(); t.items.add(new File([new Uint8Array(65 << 20)], 'huge.obj')); \
+         window.dispatchEvent(new DragEvent('drop', { dataTransfer: t, bubbles: true, cancelable: true })); })()",
+    );
+    page.wait_for(
+        "document.querySelector('#message').textContent.includes('huge.obj: expected at most 67108864 bytes')",
+    );
     drop_file(&page, "mine.csv", "0.25,0.75\n0.5,0.5\n");
     page.wait_for("document.querySelector('#points-out').textContent.includes('mine.csv')");
     assert_eq!(page.errors(), Vec::<String>::new());
@@ -221,7 +238,50 @@ fn two_samplers_are_compared_and_flipped_and_the_page_fits_a_narrow_dark_window(
     let map = shown(&page, "#screen-a");
     let count = |f: &dyn Fn(&[u8]) -> bool| map.chunks(3).filter(|p| f(p)).count();
     assert!(count(&|p| p[0] > p[2]) > 20 && count(&|p| p[2] > p[0]) > 20, "brighter and darker pixels");
+    // All of it is in the document, and comes back with it.
+    page.evaluate("window.saved = []; const make = URL.createObjectURL; URL.createObjectURL = b => { window.saved.push(b); return make.call(URL, b); }; 0");
+    page.evaluate("(() => { const s = document.querySelector('#compare-seconds'); document.querySelector('#compare-by').value = 'seconds'; s.value = 0.5; s.onchange(); })()");
+    page.evaluate("document.querySelector('#refine').click()");
+    page.wheel(page.middle("#screen-a"), -100.0);
+    let speed = page.evaluate("Number(document.querySelector('#speed').textContent)");
+    page.wait_for(
+        "(v => v.seconds === 0.5 && !v.refine && v.speed !== null)(JSON.parse(document.body.dataset.document).view)",
+    );
+    let view = document(&page)["view"].clone();
+    assert_eq!(
+        view,
+        json!({"second": "ld:sheet", "seconds": 0.5, "show": "flip", "look": "error", "refine": false, "speed": speed})
+    );
+    page.evaluate("document.querySelector('#download-json').click()");
+    page.wait_for("window.saved.length === 1");
+    let text = page.evaluate("window.saved[0].text()").as_str().unwrap().to_owned();
+    page.evaluate("document.querySelector('#reset').click()");
+    page.wait_for("!document.querySelector('#compare-on').checked && document.querySelector('#refine').checked");
+    assert_eq!(page.evaluate("document.querySelector('#views input:checked').value"), "image");
+    drop_file(&page, "again.json", &text);
+    page.wait_for("document.title.startsWith('again.json')");
+    assert_eq!(document(&page)["view"], view);
+    let shown_again = page.evaluate(
+        "['#compare-other', '#compare-by', '#compare-seconds', '#compare-how', '#views input:checked'].map(s => document.querySelector(s).value)",
+    );
+    assert_eq!(shown_again, json!(["ld:sheet", "seconds", "0.5", "flip", "error"]));
+    // What is refused is marked where it was typed, and all else shows what is.
+    page.evaluate("(() => { const o = document.querySelector('#compare-other'); o.closest('details').open = true; o.focus(); o.value = 'nonsense'; o.onchange(); })()");
+    page.wait_for(
+        "document.querySelector('#compare-other').ariaInvalid === 'true' && !document.querySelector('#message').hidden",
+    );
+    page.evaluate("document.querySelector('#compare-other').blur()");
+    page.wait_for("document.querySelector('#compare-other').value === 'ld:sheet' && document.querySelector('#compare-other').ariaInvalid !== 'true'");
+    page.evaluate("document.querySelector('#message button').click()");
     page.key("1");
+    // By keys alone: a panel opens, its first control is next, and Escape leads back.
+    page.evaluate("(document.querySelectorAll('nav details').forEach(d => d.open = false), document.querySelector('nav summary').focus())");
+    page.key("Enter");
+    page.wait_for("document.querySelector('nav details').open");
+    page.key("Tab");
+    assert_eq!(page.evaluate("document.activeElement.closest('.panel').id"), "camera-panel");
+    page.key("Escape");
+    page.wait_for("!document.querySelector('nav details').open && document.activeElement.matches('summary')");
     for (width, scheme) in [(1000, "light"), (400, "dark")] {
         page.prefer(scheme);
         page.resize(width, 700);
@@ -235,6 +295,95 @@ fn two_samplers_are_compared_and_flipped_and_the_page_fits_a_narrow_dark_window(
             assert_eq!(findings(&page), Vec::<String>::new(), "panel {panel} at {width} pixels");
         }
     }
+    assert_eq!(page.errors(), Vec::<String>::new());
+}
+
+/// All controls of the document (of the materials those of the first), and a change of the one at an index: its name, or null where it already is so.
+const CONTROLS: &str = r##"
+  window.every = () => [...document.querySelectorAll(".panel input, .panel select, #views input, #refine")].filter((c) =>
+    !c.disabled && !c.closest("#keys-panel, #configs-panel") && c.ariaLabel !== "Usual sizes"
+    && (!c.closest("#materials-panel") || c.closest("fieldset") === document.querySelector("#materials-panel fieldset")));
+  window.nameOf = (c) => `${c.closest("fieldset")?.querySelector("legend")?.textContent ?? ""} ${c.ariaLabel || c.labels[0]?.textContent || c.id} (${c.type})`.trim();
+  window.turn = (i) => {
+    const c = every()[i];
+    if (!c) return "none left";
+    const name = nameOf(c);
+    const fire = (...events) => events.forEach((event) => c.dispatchEvent(new Event(event, { bubbles: true })));
+    if (c.type === "radio" && c.checked) return null;
+    if (c.type === "checkbox" || c.type === "radio") c.click();
+    else if (c.tagName === "SELECT") {
+      c.value = [...c.options].find((o) => o.value && o.value !== c.value).value;
+      fire("change");
+    } else {
+      const number = c.step === "1" ? Number(c.value) + 1 : Number((Number(c.value) * 0.9 + 0.01).toPrecision(4));
+      c.value = { range: (Number(c.min) + Number(c.max)) / 2.1, color: "#336699", text: c.id === "seed" ? "77" : "ld:sheet" }[c.type] ?? number;
+      fire("input", "change");
+    }
+    return name;
+  };
+"##;
+
+#[test]
+fn a_change_of_any_control_is_in_the_document_and_comes_back_with_it() {
+    let Some(browser) = Browser::start() else { return };
+    let serving = small();
+    let page = browser.page();
+    page.open(&serving.address);
+    finished(&page);
+    page.evaluate(&format!("{CONTROLS}; 0"));
+    let mut changed = Vec::new();
+    for i in 0.. {
+        let before = page.evaluate("document.body.dataset.document");
+        let name = page.evaluate(&format!("turn({i})"));
+        if name == "none left" {
+            break;
+        }
+        let Some(name) = name.as_str() else { continue };
+        page.wait_for(&format!(
+            "document.body.dataset.document !== {before} || !document.querySelector('#message').hidden"
+        ));
+        let said = page.evaluate(
+            "document.querySelector('#message').hidden ? '' : document.querySelector('#message').textContent",
+        );
+        assert_eq!(said, "", "{name}: refused");
+        if name.contains("(range)") || name.contains("(color)") {
+            // One that moves says more than once what it comes to.
+            page.wait_for("document.body.dataset.asked === document.body.dataset.answered");
+        }
+        changed.push(name.to_owned());
+    }
+    let has = |part: &str| changed.iter().any(|name| name.contains(part));
+    for part in [
+        "Position x",
+        "Field of view",
+        "Auto focus",
+        "Focal depth",
+        "Power",
+        "Off: light",
+        "Albedo",
+        "Exposure",
+        "Width",
+        "lens: points",
+        "Seed",
+        "Estimator",
+        "Sampler of B",
+        "Seconds",
+        "Show",
+        "Variance",
+        "refine",
+    ] {
+        assert!(has(part), "{part} is none of {changed:?}");
+    }
+    assert!(changed.len() > 50, "{changed:?}");
+    let values = "every().map((c) => `${nameOf(c)}: ${['checkbox', 'radio'].includes(c.type) ? c.checked : c.value}`)";
+    let (whole, shown) = (document(&page), page.evaluate(values));
+    drop_file(&page, "plain.json", &json!({"framebuffer": {"res_w": 32, "res_h": 24, "sppx": 1}, "scene": {"mesh_files": ["checkerpots/checkerpots.obj"]}, "view": {}}).to_string());
+    page.wait_for("document.title.startsWith('plain.json')");
+    assert!(document(&page) != whole && page.evaluate(values) != shown);
+    drop_file(&page, "again.json", &whole.to_string());
+    page.wait_for("document.title.startsWith('again.json')");
+    assert_eq!(document(&page), whole);
+    assert_eq!(page.evaluate(values), shown);
     assert_eq!(page.errors(), Vec::<String>::new());
 }
 

@@ -26,10 +26,12 @@ export class Flight {
   }
 
   /** The document's camera; not while one is on the way, when ours is newer. */
-  take(camera, { name, radius, depth }) {
+  take({ camera, view }, { name, radius, depth }) {
     if (!this.isMoving) this.camera = structuredClone(camera);
-    // In two seconds to what is in the middle of a scene that is new here.
-    if (radius && name !== this.name) [this.name, this.speed] = [name, (depth ?? radius) * 0.5];
+    // Where the document leaves it open: in two seconds to what is in the middle of the scene.
+    if (view.speed != null) this.speed = view.speed;
+    else if (radius && (name !== this.name || this.wasSet)) this.speed = (depth ?? radius) * 0.5;
+    [this.name, this.wasSet] = [radius ? name : this.name, view.speed != null];
   }
 
   get isMoving() {
@@ -37,7 +39,7 @@ export class Flight {
   }
 
   faster(steps) {
-    this.speed *= 1.2 ** steps;
+    this.speed = Number((this.speed * 1.2 ** steps).toPrecision(3));
     return this.speed;
   }
 

@@ -43,7 +43,9 @@ export class Controls {
   /** Shows a state of the document. */
   update(state) {
     this.state = { ...this.state, ...state };
+    this.told = structuredClone(state.config.scene.materials);
     for (const update of this.updates) update(state);
+    this.second.forEach((button) => (button.hidden = state.config.view.second === null));
     if (state.materials) {
       this.materials(document.querySelector("#materials-panel"));
       this.lights(document.querySelector("#lights-panel"));
@@ -75,9 +77,9 @@ export class Controls {
 
   vector(text, key) {
     const inputs = ["x", "y", "z"].map((axis) => make("input", { type: "number", step: "any", ariaLabel: `${text} ${axis}` }));
-    const send = () => inputs.every((i) => i.value !== "") && this.link.set({ [key]: inputs.map((i) => Number(i.value)) });
-    inputs.forEach((input) => (input.onchange = send));
-    this.updates.push((state) => inputs.forEach((input, i) => show(input, Number(at(state.config, key)[i].toPrecision(6)))));
+    // One by one: what is shown of the others is rounded.
+    inputs.forEach((input, i) => (input.onchange = () => input.value !== "" && this.link.set({ [`${key}.${i}`]: Number(input.value) })));
+    this.updates.push((state) => inputs.forEach((input, i) => show(input, Number(at(state.config, key)[i].toPrecision(5)))));
     return row(text, make("div", { className: "three" }, ...inputs), inputs[0]);
   }
 
@@ -130,16 +132,14 @@ export class Controls {
       sizes.value = "";
     };
     const save = (what, panel, text) => make("button", { type: "button", textContent: text, onclick: () => link.ask("download", { what, panel }) });
-    const second = [save("png", 1, "PNG of B"), save("exr", 1, "EXR of B")];
-    this.second = (on) => second.forEach((button) => (button.hidden = !on));
-    this.second(false);
+    this.second = [save("png", 1, "PNG of B"), save("exr", 1, "EXR of B")];
     panel.append(
       this.number("Width", "framebuffer.res_w", { min: 1, step: 1 }),
       this.number("Height", "framebuffer.res_h", { min: 1, step: 1 }),
       make("p", { className: "buttons" }, sizes),
       this.number("Samples a pixel", "framebuffer.sppx", { min: 1, step: 1 }),
       this.slider("Exposure", "framebuffer.exposure", { min: -4, max: 8, step: 0.05 }, (x) => Math.log2(Math.max(x, 0.0625)), (x) => 2 ** x),
-      make("p", { className: "buttons" }, save("png", 0, "Save PNG"), save("exr", 0, "Save EXR"), ...second),
+      make("p", { className: "buttons" }, save("png", 0, "Save PNG"), save("exr", 0, "Save EXR"), ...this.second),
     );
   }
 
@@ -149,6 +149,12 @@ export class Controls {
       this.choice("Shading", "shading", [["direct", "direct light"], ["albedo", "albedo, no lights"]]),
       make("p", { className: "hint", textContent: "The two estimators differ from two lights on. The reference is always unbiased." }),
     );
+  }
+
+  /** Shows the document again after a change that was refused. */
+  revert() {
+    this.state.config.scene.materials = this.told;
+    this.update(this.state);
   }
 
   /** Changes the patch of a material: keys that are null go. */
@@ -181,14 +187,14 @@ export class Controls {
     return row(text, input);
   }
 
-  /** Builds a panel anew, unless somebody is at work in it. */
-  rebuild(panel, parts) {
-    const shape = parts.map(({ material: m }) => `${m.name} ${m.emits}`).join("\n");
-    if (panel.contains(document.activeElement) && panel.dataset.shape === shape) return;
-    const focused = panel.contains(document.activeElement) ? document.activeElement.ariaLabel : null;
-    panel.dataset.shape = shape;
-    panel.replaceChildren(...parts.map(({ node }) => node));
-    if (focused) [...panel.querySelectorAll("[aria-label]")].find((e) => e.ariaLabel === focused)?.focus();
+  /** Builds a panel anew, the focus where it was, unless somebody is in the midst of typing a number or choosing a colour there. */
+  rebuild(panel, nodes) {
+    const controls = (parts) => parts.flatMap((part) => [...part.querySelectorAll("input, button")]);
+    const at = controls([panel]).indexOf(document.activeElement);
+    const [active, anew] = [document.activeElement, controls(nodes)[at]];
+    if (at >= 0 && anew?.type === active.type && (active.type === "color" || (active.type === "number" && active.value !== anew.value))) return;
+    panel.replaceChildren(...nodes);
+    if (at >= 0) anew?.focus({ preventScroll: true });
   }
 
   materials(panel) {
@@ -198,7 +204,7 @@ export class Controls {
         this.colour("Albedo", material), this.strength("Emission", material),
         make("p", { className: "buttons" }, make("button", { type: "button", textContent: "As in the MTL file", onclick: original })));
       if (material.textured) node.append(make("p", { className: "hint", textContent: "A texture multiplies the albedo." }));
-      return { material, node };
+      return node;
     });
     this.rebuild(panel, parts);
     if (parts.length === 0) panel.replaceChildren(make("p", { textContent: "The scene has no named material." }));
@@ -215,9 +221,9 @@ export class Controls {
       off.onchange = () => this.patch(material.name, { emissive_strength: off.checked ? 0 : before });
       const light = this.state.lights.find((l) => l.name === material.name);
       const about = light ? `Area ${Number(light.area.toPrecision(4))}, power ${Number(light.power.toPrecision(4))} (area × luma of the radiance).` : "Off.";
-      return { material, node: make("fieldset", {}, make("legend", { textContent: material.name }),
+      return make("fieldset", {}, make("legend", { textContent: material.name }),
         this.colour("Colour", material), this.strength("Power (strength)", material), row("Off", off),
-        make("p", { className: "hint", textContent: about })) };
+        make("p", { className: "hint", textContent: about }));
     });
     this.rebuild(panel, parts);
     if (parts.length === 0) panel.replaceChildren(make("p", { textContent: "The scene has no light. Give a material an emission under Materials." }));

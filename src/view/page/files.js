@@ -54,19 +54,23 @@ export function takeDrops(link, failed) {
       const files = await filesOf(event.dataTransfer);
       if (files.length > 0) await link.upload(files);
     } catch (error) {
-      failed(`drop: expected readable files, found: ${error.message}`);
+      failed(error.message);
     }
   });
 }
 
 /** The panel of configs. */
 export class Configs {
-  constructor(link, panel, canSave) {
+  constructor(link, panel, canSave, failed) {
     this.list = make("select", { id: "config-list" });
     const load = make("button", { type: "button", textContent: "Load", onclick: () => this.list.value && link.ask("load", { name: this.list.value }) });
     const open = make("input", { type: "file", id: "config-files", multiple: true, accept: ".json,.obj,.mtl,.png,.jpg,.jpeg,.csv,.txt" });
     open.onchange = async () => {
-      await link.upload([...open.files].map((file) => ({ name: file.name, file })));
+      try {
+        await link.upload([...open.files].map((file) => ({ name: file.name, file })));
+      } catch (error) {
+        failed(error.message);
+      }
       open.value = "";
     };
     this.name = make("input", { type: "text", id: "config-name", maxLength: 100 });

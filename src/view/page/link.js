@@ -22,6 +22,8 @@ export class Link {
     };
     this.socket.onclose = () => lost();
     this.drops = 0;
+    /** What may be sent, once the program has said so. */
+    this.bounds = { most_files: 0, most_bytes: 0 };
     document.body.dataset.asked = this.sets = 0;
   }
 
@@ -41,8 +43,12 @@ export class Link {
     this.ask("set", { sets, moving });
   }
 
-  /** Sends files of one drop, in order. */
+  /** Sends files of one drop, in order. Throws where there are too many or one is too large: the program would not take them. */
   async upload(files) {
+    const { most_files, most_bytes } = this.bounds;
+    const large = files.find(({ file }) => file.size > most_bytes);
+    if (large) throw new Error(`${large.name}: expected at most ${most_bytes} bytes, found ${large.file.size}`);
+    if (files.length > most_files) throw new Error(`drop: expected at most ${most_files} files, found ${files.length}`);
     const upload = ++this.drops;
     for (const [i, { name, file }] of files.entries()) {
       const header = encoder.encode(JSON.stringify({ upload, name, last: i + 1 === files.length }));

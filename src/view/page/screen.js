@@ -9,6 +9,11 @@ export class Screen {
     this.caption = document.querySelector(`#caption-${letter}`);
     this.context = this.canvas.getContext("2d", { alpha: false });
     this.small = document.createElement("canvas");
+    this.ring = document.createElement("span");
+    this.ring.className = "mark";
+    this.ring.hidden = true;
+    this.canvas.after(this.ring);
+    new ResizeObserver(() => this.place()).observe(this.canvas);
     this.full = [1, 1];
   }
 
@@ -38,9 +43,33 @@ export class Screen {
       this.context.drawImage(this.small, 0, 0, width * panel.block, height * panel.block);
     }
     // Enlarged, pixels stay squares; reduced, they are averaged.
-    const box = this.canvas.getBoundingClientRect();
-    this.canvas.classList.toggle("smooth", Math.min(box.width / full[0], box.height / full[1]) < 1);
+    this.canvas.classList.toggle("smooth", this.fit().scale < 1);
     this.describe(panel);
+    this.place();
+  }
+
+  /** Where the picture is in its canvas, in whose middle it is fitted: its top left corner, and the size of a pixel. */
+  fit() {
+    const box = this.canvas.getBoundingClientRect();
+    const [w, h] = this.full;
+    const scale = Math.min(box.width / w, box.height / h);
+    return { left: box.left + (box.width - scale * w) / 2, top: box.top + (box.height - scale * h) / 2, scale };
+  }
+
+  /** Rings a pixel, or none. */
+  mark(pixel) {
+    this.marked = pixel;
+    this.place();
+  }
+
+  place() {
+    const is = this.marked && this.marked.x < this.full[0] && this.marked.y < this.full[1];
+    this.ring.hidden = !is;
+    if (!is) return;
+    const { left, top, scale } = this.fit();
+    const frame = this.figure.getBoundingClientRect();
+    this.ring.style.left = `${left - frame.left + (this.marked.x + 0.5) * scale}px`;
+    this.ring.style.top = `${top - frame.top + (this.marked.y + 0.5) * scale}px`;
   }
 
   describe({ view, scale, samples, of, sampler, reference, timing, block }) {
@@ -60,12 +89,8 @@ export class Screen {
 
   /** The pixel under a mouse event, or null. */
   pixelAt(event) {
-    const box = this.canvas.getBoundingClientRect();
-    const [w, h] = this.full;
-    // The picture is fitted into the canvas's box, in its middle.
-    const scale = Math.min(box.width / w, box.height / h);
-    const x = Math.floor((event.clientX - box.left - (box.width - scale * w) / 2) / scale);
-    const y = Math.floor((event.clientY - box.top - (box.height - scale * h) / 2) / scale);
+    const { left, top, scale } = this.fit();
+    const [x, y] = [Math.floor((event.clientX - left) / scale), Math.floor((event.clientY - top) / scale)];
     return x >= 0 && y >= 0 && x < this.full[0] && y < this.full[1] ? { x, y } : null;
   }
 }

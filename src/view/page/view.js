@@ -2,6 +2,7 @@
 
 import { Flight } from "./camera.js";
 import { pointSet, spectrum } from "./charts.js";
+import { Comparison } from "./comparison.js";
 import { Controls, make } from "./controls.js";
 import { Configs, offer, takeDrops } from "./files.js";
 import { Link } from "./link.js";
@@ -10,9 +11,12 @@ import { Screen, many, number } from "./screen.js";
 
 const $ = (selector) => document.querySelector(selector);
 const screens = [new Screen("a"), new Screen("b")];
-let samplers, configs, picked, flipped = 0, panels = 1, spectral = 0;
+let samplers, configs, compare, picked, flipped = 0, panels = 1, spectral = 0;
 
+/** Says what went wrong until it is closed or mended; what is good to know for some seconds. */
 function say(text, good = false) {
+  clearTimeout(say.ends);
+  if (good) say.ends = setTimeout(() => say(""), 5000);
   $("#message").hidden = !text;
   $("#message").classList.toggle("good", good);
   $("#message span").textContent = text;
@@ -28,9 +32,10 @@ function lost() {
 const link = new Link(
   {
     hello(hello) {
+      link.bounds = hello;
       samplers = new Samplers(link, hello);
-      configs = new Configs(link, $("#configs-panel"), hello.can_save);
-      compare.build(hello);
+      configs = new Configs(link, $("#configs-panel"), hello.can_save, say);
+      compare = new Comparison(link, hello, arrange);
       for (const { key, name } of hello.decisions) $("#points-decision").append(make("option", { value: key, textContent: name }));
       document.body.dataset.connected = "yes";
     },
@@ -41,7 +46,11 @@ const link = new Link(
       controls.update(state);
       samplers.update(state);
       configs.update(state);
-      flight.take(state.config.camera, state);
+      compare.update(state);
+      flight.take(state.config, state);
+      document.querySelector(`#views input[value=${state.config.view.look}]`).checked = true;
+      $("#refine").checked = state.config.view.refine;
+      arrange();
       $("#speed").textContent = number(flight.speed);
       if (state.notes) $("#notes").replaceChildren(...state.notes.map((text) => make("li", { textContent: text })));
       for (const option of $("#points-decision").options) option.disabled = !state.made.includes(option.value);
@@ -65,6 +74,8 @@ const link = new Link(
     pick({ distance, depth, material, emits, focused }) {
       const what = distance == null ? "Nothing there." : `Distance ${number(distance)}, depth ${number(depth)}: ${material}${emits ? " (emits)" : ""}.`;
       $("#picked").textContent = what + (focused ? " In focus now." : "");
+      // Where the numbers lie below the picture, they would not be seen.
+      if (matchMedia("(max-width: 56rem)").matches) say($("#picked").textContent, true);
     },
     points({ about, sets }) {
       const title = about.file ? `${about.file}` : `Pixel (${about.x}, ${about.y}), ${about.name}`;
@@ -79,7 +90,11 @@ const link = new Link(
     },
     saved: ({ name }) => say(`Saved as ${name}.`, true),
     file: offer,
-    error: ({ text }) => say(text),
+    error({ text }) {
+      say(text);
+      // Nothing changed: controls show what is, but for one in which somebody may want to mend what was typed.
+      if (controls.state) showAgain(document.activeElement?.matches("input, select") ? document.activeElement : null);
+    },
     refused({ text }) {
       lost.told = true;
       say(text);
@@ -92,36 +107,22 @@ const flight = new Flight((camera, moving) =>
   link.set({ "camera.pos": camera.pos, "camera.dir": camera.dir, "camera.up": camera.up }, moving));
 takeDrops(link, say);
 
-// Two samplers.
-const compare = {
-  build({ presets, legal }) {
-    const panel = $("#compare-panel");
-    const row = (text, input) => make("div", { className: "row" }, make("label", { htmlFor: input.id, textContent: text }), input);
-    this.on = make("input", { type: "checkbox", id: "compare-on" });
-    this.other = make("input", { type: "text", id: "compare-other", value: "uniform" });
-    this.other.setAttribute("list", "compare-list");
-    const list = make("datalist", { id: "compare-list" });
-    for (const text of [...Object.keys(presets), ...legal]) list.append(make("option", { value: text }));
-    this.by = make("select", { id: "compare-by" }, make("option", { value: "samples", textContent: "the same samples a pixel" }), make("option", { value: "seconds", textContent: "the same seconds of rendering" }));
-    this.seconds = make("input", { type: "number", id: "compare-seconds", min: 0.1, max: 3600, step: "any", value: 3 });
-    this.how = make("select", { id: "compare-how" }, make("option", { value: "side", textContent: "side by side" }), make("option", { value: "flip", textContent: "flipped with the key X" }));
-    for (const input of [this.on, this.other, this.by, this.seconds]) input.onchange = () => this.send();
-    this.how.onchange = arrange;
-    panel.append(row("Second sampler (B)", this.on), row("Sampler of B", this.other), list, row("Budget", this.by), row("Seconds each", this.seconds), row("Show", this.how),
-      make("p", { className: "hint", textContent: "B has the scene's seed. One sampler for all decisions, or pixel=… lens=… light-pick=… light=…. In a budget of seconds the count is chosen by what a few samples take, since a set belongs to its count." }));
-    this.send(true);
-  },
-  send(first) {
-    const bySeconds = this.by.value === "seconds";
-    this.seconds.disabled = !bySeconds;
-    controls.second(this.on.checked);
-    if (!first) link.ask("compare", { other: this.on.checked ? this.other.value : null, seconds: bySeconds ? Number(this.seconds.value) : null });
-  },
-};
+/** Shows the document again in all controls; one that has the focus keeps what was typed, marked, until it is left. */
+function showAgain(typed) {
+  controls.revert();
+  samplers.update(controls.state);
+  compare.update(controls.state);
+  if (!typed) return;
+  typed.setAttribute("aria-invalid", "true");
+  typed.addEventListener("blur", () => {
+    typed.removeAttribute("aria-invalid");
+    setTimeout(() => showAgain(null));
+  }, { once: true });
+}
 
 /** One panel, two beside each other, or one of two. */
 function arrange() {
-  const flips = panels > 1 && compare.how?.value === "flip";
+  const flips = panels > 1 && compare?.flips;
   $("#stage").dataset.panels = flips ? 1 : panels;
   $("#stage").classList.toggle("flip", flips);
   screens[0].figure.hidden = flips && flipped === 1;
@@ -180,8 +181,28 @@ function showProbe({ x, y, panels: values, reference }) {
 let under = null, dragFrom = null, probing = 0;
 const middle = () => ({ x: screens[0].full[0] >> 1, y: screens[0].full[1] >> 1 });
 
+/** Rings a pixel and shows its values. */
+function choose(pixel) {
+  picked = pixel;
+  for (const screen of screens) screen.mark(pixel);
+  link.ask("probe", pixel);
+}
+
 function askPoints() {
-  link.ask("points", { ...(picked ?? under ?? middle()), decision: $("#points-decision").value || "pixel" });
+  choose(under ?? picked ?? middle());
+  link.ask("points", { ...picked, decision: $("#points-decision").value || "pixel" });
+}
+
+const STEPS = { KeyI: [0, -1], KeyK: [0, 1], KeyJ: [-1, 0], KeyL: [1, 0] };
+
+/** Moves the ring by a pixel, or ten. */
+function step([dx, dy], far) {
+  const [w, h] = screens[0].full;
+  const inside = (i, n) => Math.max(0, Math.min(n - 1, i));
+  const { x, y } = picked ?? middle();
+  // The keys' until the mouse moves again.
+  under = null;
+  choose({ x: inside(x + dx * far, w), y: inside(y + dy * far, h) });
 }
 
 for (const screen of screens) {
@@ -215,7 +236,9 @@ for (const screen of screens) {
     pick(screen.pixelAt(event));
   });
   canvas.addEventListener("dblclick", (event) => {
-    picked = screen.pixelAt(event);
+    const pixel = screen.pixelAt(event);
+    if (!pixel) return;
+    choose(pixel);
     askPoints();
   });
   canvas.addEventListener("wheel", (event) => {
@@ -228,15 +251,14 @@ addEventListener("blur", () => flight.releaseAll());
 
 function pick(pixel) {
   if (!pixel) return;
-  picked = pixel;
-  link.ask("probe", pixel);
+  choose(pixel);
   link.ask("pick", pixel);
 }
 
 function look(index) {
   const radio = document.querySelectorAll("#views input")[index];
   radio.checked = true;
-  link.ask("look", { view: radio.value });
+  link.set({ "view.look": radio.value });
 }
 
 const CONTROLS = "input, select, button, summary, textarea";
@@ -261,10 +283,11 @@ addEventListener("keydown", (event) => {
   else if (event.code === "Space") {
     event.preventDefault();
     link.ask("restart");
-  } else if (event.repeat) return;
+  } else if (event.code in STEPS) step(STEPS[event.code], event.shiftKey ? 10 : 1);
+  else if (event.repeat) return;
   else if (event.code === "KeyX") flip();
   else if (event.code === "KeyP") askPoints();
-  else if (event.code === "Enter") pick(under ?? middle());
+  else if (event.code === "Enter") pick(under ?? picked ?? middle());
   else if (event.key === "+" || event.key === "-") faster(event.key === "+" ? 1 : -1);
   else if (/^[1-4]$/.test(event.key)) look(Number(event.key) - 1);
 });
@@ -278,6 +301,7 @@ function flip() {
 
 function faster(steps) {
   $("#speed").textContent = number(flight.faster(steps));
+  link.set({ "view.speed": flight.speed }, true);
   say(`Speed: ${number(flight.speed)} units a second.`, true);
 }
 
@@ -291,7 +315,7 @@ document.querySelectorAll("#views input").forEach((radio, i) => (radio.onchange 
 $("#reset").onclick = () => link.ask("reset");
 $("#restart").onclick = () => link.ask("restart");
 $("#stop").onclick = () => link.ask("stop");
-$("#refine").onchange = (event) => link.ask("reference", { on: event.target.checked });
+$("#refine").onchange = (event) => link.set({ "view.refine": event.target.checked });
 $("#points-go").onclick = askPoints;
 $("#spectrum-go").onclick = () => {
   clearTimeout(spectral);

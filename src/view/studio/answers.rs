@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::super::analyst::{self, MAX_POINTS, PointSet};
 use super::super::document::Document;
-use super::super::message::{Ask, Download, View};
+use super::super::message::{Ask, Download};
 use super::super::side::Side;
 use super::{Open, Studio};
 use crate::error::{Error, Result};
@@ -19,6 +19,24 @@ use crate::scene::camera::{Aperture, PixelSample};
 use crate::scene::compile::Scene;
 use crate::scene::light::LightSet;
 
+/// What takes a while.
+#[derive(Clone, Copy)]
+enum Errand {
+    Points,
+    Spectrum,
+    File,
+}
+
+impl Errand {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Points => "points",
+            Self::Spectrum => "spectrum",
+            Self::File => "download",
+        }
+    }
+}
+
 impl Studio {
     /// Does, or begins, what is asked for.
     ///
@@ -27,7 +45,6 @@ impl Studio {
     pub(super) fn answer(&mut self, ask: Ask) -> Result<()> {
         match ask {
             Ask::Set { sets, moving } => {
-                self.stopped = false;
                 let changed = self.document()?.with_sets(&sets)?;
                 self.take_document(changed, moving)
             }
@@ -49,20 +66,6 @@ impl Studio {
             }
             Ask::Stop {} => {
                 self.stopped = true;
-                Ok(())
-            }
-            Ask::Look { view } => {
-                self.view = view;
-                self.wants_truth = matches!(view, View::Reference | View::Error);
-                self.show.is_stale = true;
-                Ok(())
-            }
-            Ask::Compare { other, seconds } => {
-                self.stopped = false;
-                self.compare(other.as_deref(), seconds)
-            }
-            Ask::Reference { on } => {
-                self.refines = on;
                 Ok(())
             }
             // The inbox keeps the last one itself.
@@ -154,7 +157,7 @@ impl Studio {
         let sets = self.sides.iter().map(|side| set_of(side, scene, PixelKey::new(x, y), decision)).collect();
         let about = json!({"x": x, "y": y, "decision": decision.key(), "name": decision.name()});
         let outbox = self.outbox.clone();
-        self.errand("points", move || analyst::points(&about, sets, &outbox))
+        self.errand(Errand::Points, move || analyst::points(&about, sets, &outbox))
     }
 
     fn spectrum(&mut self) -> Result<()> {
@@ -169,14 +172,14 @@ impl Studio {
         let panel = |side: &Side| (side.set.to_string(), side.growing.image(), side.growing.samples());
         let panels: Vec<_> = self.sides.iter().map(panel).collect();
         let (samples, outbox) = (self.reference.as_ref().map_or(0, |r| r.samples()), self.outbox.clone());
-        self.errand("spectrum", move || analyst::spectrum(&panels, &halves, samples, &outbox))
+        self.errand(Errand::Spectrum, move || analyst::spectrum(&panels, &halves, samples, &outbox))
     }
 
-    /// Does something that takes a while, one at a time.
-    fn errand(&self, name: &str, work: impl FnOnce() + Send + 'static) -> Result<()> {
-        match self.errands.start(work) {
+    /// Does something that takes a while, one of its kind at a time.
+    fn errand(&self, kind: Errand, work: impl FnOnce() + Send + 'static) -> Result<()> {
+        match self.errands[kind as usize].start(work) {
             true => Ok(()),
-            false => Err(Error::input(name, "expected one such request at a time, found another under way")),
+            false => Err(Error::input(kind.name(), "expected one such request at a time, found another under way")),
         }
     }
 
@@ -224,7 +227,7 @@ impl Studio {
         let (image, exposure, outbox) = (side.growing.image(), self.exposure, self.outbox.clone());
         let name = format!("{stem}-{}spp", side.growing.samples());
         if what == Download::Png {
-            return self.errand("png", move || analyst::png(&format!("{name}.png"), &image, exposure, &outbox));
+            return self.errand(Errand::File, move || analyst::png(&format!("{name}.png"), &image, exposure, &outbox));
         }
         let text = |name: &str, value: &dyn std::fmt::Display| (name.to_owned(), value.to_string());
         let provenance = [
@@ -237,7 +240,7 @@ impl Studio {
             text("seed", &document.seed),
             text("estimator", &scene.estimator.name()),
         ];
-        self.errand("exr", move || analyst::exr(&format!("{name}.exr"), &image, &provenance, &outbox))
+        self.errand(Errand::File, move || analyst::exr(&format!("{name}.exr"), &image, &provenance, &outbox))
     }
 
     /// A config, a mesh with what belongs to it, or a point set.
@@ -275,7 +278,7 @@ impl Studio {
         let coordinates = found.iter().flatten().copied().collect();
         let set = PointSet { source: name.clone(), dimension: found.dimension(), coordinates };
         let (about, outbox) = (json!({"file": name}), self.outbox.clone());
-        self.errand("points", move || analyst::points(&about, vec![set], &outbox))?;
+        self.errand(Errand::Points, move || analyst::points(&about, vec![set], &outbox))?;
         self.changed = Instant::now();
         Ok(())
     }
