@@ -143,6 +143,13 @@ impl Accel {
         self.single.get_or_init(|| Tree8::new(self, self.pad))
     }
 
+    /// The first node, or the leaf that is all of the tree. There is a node.
+    #[cfg(target_arch = "x86_64")]
+    pub(super) fn root(&self) -> Child {
+        let node = &self.nodes[0];
+        if node.children[0] == node.children[1] { node.children[0] } else { Child::inner(0) }
+    }
+
     /// Copies obvhs' tree, depth first, so that a node's first child follows it.
     fn copy(&mut self, tree: &Bvh2, place: &impl Fn(u32) -> Slot) {
         let bounds_of = |n: usize| {

@@ -412,10 +412,35 @@ mod tests {
                 triangles.extend_from_within(..);
             }
             agree(&triangles, 4.0 * scale, &rays(&mut stream, 800, scale));
+            agree(&triangles, 4.0 * scale, &bundles(&mut stream, 120, scale));
         }
         agree(&[], 1.0, &rays(&mut Stream(3, 0), 4, 1.0));
         let one = Triangle { corners: [Vec3::X, Vec3::Y, Vec3::Z] };
         agree(&[one], 3.0, &rays(&mut Stream(4, 0), 64, 1.0));
+    }
+
+    /// Rays that have something in common, 16 to a packet: from a point, a pixel's, a lens's, to a lamp. Some lanes are idle, and every
+    /// fourth packet runs along an axis.
+    fn bundles(stream: &mut Stream, packets: usize, scale: f32) -> Vec<(Ray, f32)> {
+        let widths = [0.0, 1e-4, 0.02, 0.4];
+        let mut rays = Vec::new();
+        for p in 0..packets {
+            let (from, mut to) = (stream.vec3() * 1.5, stream.vec3());
+            if p % 4 == 0 {
+                to = from + (to - from) * [Vec3::X, Vec3::Y, Vec3::Z][p / 4 % 3];
+            }
+            for lane in 0..LANES {
+                let origin = from + stream.vec3() * widths[p % 3];
+                let direction = to + stream.vec3() * widths[p / 3 % 4] - origin;
+                let limit = match (p + lane) % 7 {
+                    0 if p % 2 == 0 => f32::NEG_INFINITY,
+                    1 => 0.9,
+                    _ => f32::INFINITY,
+                };
+                rays.push((Ray { origin: origin * scale, direction: direction * scale }, limit));
+            }
+        }
+        rays
     }
 
     /// A closed box of two triangles a side, rays from inside through faces, edges and the diagonals: none escapes.
