@@ -38,8 +38,8 @@ echo "| scene without | built without it | seconds | seconds of the build that h
 echo "|---|---|---|---|---|---|"
 row() { # FEATURE STAGE WHAT
     for _ in $(seq "$rounds"); do
-        printf '%s %s\n' "$("$work/all" "$root/configs/cornell.json" "$root/data" 64 "$2")" \
-            "$("$work/$1" "$root/configs/cornell.json" "$root/data" 64 "$2")"
+        printf '%s %s\n' "$("$work/all" "$root/configs/cornell.json" "$root/data" 16 "$2")" \
+            "$("$work/$1" "$root/configs/cornell.json" "$root/data" 16 "$2")"
     done | awk '{ print $1 / $3, $1, $3, $2 == $4 }' | sort -n | awk -v what="$3" -v feature="$1" '
         { ratio[NR] = $1; all[NR] = $2; without[NR] = $3; same += $4 }
         function at(part) { return ratio[1 + int(part * (NR - 1) + 0.5)] }
