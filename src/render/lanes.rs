@@ -29,6 +29,14 @@ pub(super) struct Span {
     pub count: usize,
 }
 
+/// What a scene may have. `benches/features.sh` builds copies that never had one of these, and times both on scenes without it:
+/// they must not differ, as a feature that a scene lacks costs one question a packet.
+const PIXEL: bool = !cfg!(without = "pixel");
+const LENS: bool = !cfg!(without = "lens");
+/// Several lights, or one that is no parallelogram.
+const LIGHTS: bool = !cfg!(without = "lights");
+const TEXTURES: bool = !cfg!(without = "textures");
+
 /// A lane without a ray.
 const IDLE: f32 = f32::NEG_INFINITY;
 
@@ -88,17 +96,17 @@ impl Lanes {
     #[inline(always)]
     pub(super) fn look_up<S: PointSource>(&mut self, scene: &Scene, source: &S, spans: &[Span]) {
         let pixel = match &scene.camera.pixel {
-            PixelSample::Center => None,
-            PixelSample::Sampled(dim) => Some(dim),
+            PixelSample::Sampled(dim) if PIXEL => Some(dim),
+            _ => None,
         };
         let lens = match &scene.camera.aperture {
-            Aperture::Pinhole => None,
-            Aperture::ThinLens { lens, .. } => Some(lens),
+            Aperture::ThinLens { lens, .. } if LENS => Some(lens),
+            _ => None,
         };
         let (pick, light) = match &scene.lights {
-            None | Some(LightSet::Dark) => (None, None),
             Some(LightSet::One { point, .. }) => (None, Some(point)),
-            Some(LightSet::Many { pick, point, .. }) => (Some(pick), Some(point)),
+            Some(LightSet::Many { pick, point, .. }) if LIGHTS => (Some(pick), Some(point)),
+            _ => (None, None),
         };
         for span in spans {
             let key = PixelKey::new(span.x, span.y);
@@ -133,15 +141,15 @@ impl Lanes {
         let camera = &scene.camera;
         let at = |lane: usize| Vec2::new(x[lane] + self.pixel[0][lane], y[lane] + self.pixel[1][lane]);
         match &camera.aperture {
-            Aperture::Pinhole => {
-                for lane in 0..LANES {
-                    self.view.put(lane, &camera.pinhole_ray(at(lane)));
-                }
-            }
-            Aperture::ThinLens { radius, focal_depth, .. } => {
+            Aperture::ThinLens { radius, focal_depth, .. } if LENS => {
                 for lane in 0..LANES {
                     let u = Vec2::new(self.lens[0][lane], self.lens[1][lane]);
                     self.view.put(lane, &camera.lens_ray(at(lane), u, *radius, *focal_depth));
+                }
+            }
+            _ => {
+                for lane in 0..LANES {
+                    self.view.put(lane, &camera.pinhole_ray(at(lane)));
                 }
             }
         }
@@ -181,11 +189,12 @@ impl Lanes {
         }
         let count = match lights {
             LightSet::Dark => 0,
-            LightSet::One { light, .. } => match light.parallelogram() {
+            LightSet::One { light, .. } if light.is_parallelogram() || !LIGHTS => match light.parallelogram() {
                 Some(shape) => self.light_from(shape, light.area, light.emission, &open),
-                None => self.light_from_any(scene, lights, &open),
+                None => 0,
             },
-            LightSet::Many { .. } => self.light_from_any(scene, lights, &open),
+            _ if LIGHTS => self.light_from_any(scene, lights, &open),
+            _ => 0,
         };
         if count > 0 {
             self.ray_count += u64::from(count);
@@ -225,7 +234,7 @@ impl Lanes {
             put_where(&mut self.albedo, &left, next, material.albedo);
             put_one_where(&mut self.emitter, &left, next, u32::from(material.is_emitter));
             emits |= material.is_emitter;
-            textured |= material.texture.is_some();
+            textured |= TEXTURES && material.texture.is_some();
             take(&mut left, next);
         }
         if textured {

@@ -1,9 +1,9 @@
 //! Halton's axes made ready: radical inverses from tables, and nested random digit permutations.
 
 use super::divisor::Divisor;
-use super::{each, row};
 use super::hash::bits64;
 use super::radical::{digit_count, is_in_single, mirrored, radical_inverse};
+use super::{each, row};
 use crate::mutants::{Mutant, planted};
 
 /// Indices looked up at once, at most.

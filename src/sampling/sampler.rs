@@ -296,8 +296,13 @@ enum Places {
     /// the last beyond the count. Nobody reads these.
     Run(u32),
     /// Any order; 0 in lanes that nobody reads.
-    Any([u32; BLOCK]),
+    Any(Aligned),
 }
+
+/// A row that lies in one cache line: it goes through memory between being made and being read.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct Aligned([u32; BLOCK]);
 
 impl Places {
     /// The places in a row, none of them below 0.
@@ -305,7 +310,7 @@ impl Places {
     fn row(&self) -> [u32; BLOCK] {
         match self {
             Self::Run(first) => row(*first),
-            Self::Any(places) => *places,
+            Self::Any(places) => places.0,
         }
     }
 }
@@ -414,7 +419,7 @@ impl DecisionSampler {
         } else {
             Permutation::new(self.samples, keys.shuffle).places(&mut places);
         }
-        Places::Any(places)
+        Places::Any(Aligned(places))
     }
 
     /// R(P(i, axis)) as a 32-bit fraction, for every place.
@@ -433,18 +438,22 @@ impl DecisionSampler {
             AxisKind::Uniform => each(&places.row(), |i| bits32(key, i)),
             AxisKind::StratifiedX => each(&places.row(), |i| stratum_fraction(column(i), columns, jitter(i))),
             AxisKind::StratifiedY => each(&places.row(), |i| stratum_fraction(row(i), rows, jitter(i))),
-            AxisKind::Halton(halton) if self.spec.random == Random::Digits => halton.digit_scrambled(&places.row(), key),
+            AxisKind::Halton(halton) if self.spec.random == Random::Digits => {
+                halton.digit_scrambled(&places.row(), key)
+            }
             AxisKind::Halton(halton) => {
                 let plain = match places {
                     Places::Run(first) => halton.run(*first),
-                    Places::Any(places) => halton.radical_inverses(places),
+                    Places::Any(places) => halton.radical_inverses(&places.0),
                 };
                 self.randomised(key, plain)
             }
             AxisKind::HammersleyX(cells) if self.spec.random == Random::Yxor => {
                 each(&places.row(), |i| stratum_fraction(i, *cells, 0))
             }
-            AxisKind::HammersleyX(cells) => self.randomised(key, each(&places.row(), |i| stratum_fraction(i, *cells, 0))),
+            AxisKind::HammersleyX(cells) => {
+                self.randomised(key, each(&places.row(), |i| stratum_fraction(i, *cells, 0)))
+            }
             AxisKind::VanDerCorput if planted(Mutant::BytesReversed) => {
                 self.randomised(key, each(&places.row(), u32::swap_bytes))
             }
@@ -452,7 +461,7 @@ impl DecisionSampler {
             AxisKind::Sobol(sobol) => {
                 let plain = match places {
                     Places::Run(first) => sobol.run(first.wrapping_add(skipped)),
-                    Places::Any(places) => sobol.fractions(&each(places, |i| i + skipped)),
+                    Places::Any(places) => sobol.fractions(&each(&places.0, |i| i + skipped)),
                 };
                 self.randomised(key, plain)
             }
@@ -479,7 +488,7 @@ impl DecisionSampler {
     fn fraction(&self, axis: usize, i: u32, keys: &Keys) -> u32 {
         let mut places = [0; BLOCK];
         places[0] = i;
-        self.fractions(axis, &Places::Any(places), keys)[0]
+        self.fractions(axis, &Places::Any(Aligned(places)), keys)[0]
     }
 
     /// The same value correctly rounded to f64 where the 32-bit fraction is not exact.

@@ -213,10 +213,8 @@ impl SurfaceRows {
     fn transpose(&mut self, faces: &[Face], triangles: &[u32; LANES]) -> FaceRows {
         let first = &faces[triangles[0] as usize];
         let ([c0, c1, c2], [n0, n1, n2]) = (first.corners, first.normals);
-        let mut rows = FaceRows {
-            corners: [splat(c0), splat(c1), splat(c2)],
-            normals: [splat(n0), splat(n1), splat(n2)],
-        };
+        let mut rows =
+            FaceRows { corners: [splat(c0), splat(c1), splat(c2)], normals: [splat(n0), splat(n1), splat(n2)] };
         self.face_normal = splat(first.face_normal);
         let mut left = *triangles;
         take(&mut left, triangles[0]);
