@@ -13,6 +13,8 @@ mod avx512;
 #[cfg(target_arch = "x86_64")]
 mod beam;
 mod build;
+#[cfg(target_arch = "x86_64")]
+mod descent;
 mod nodes8;
 mod packet;
 mod packet_tree;

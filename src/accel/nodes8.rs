@@ -134,6 +134,28 @@ impl Tree8 {
         tree
     }
 
+    /// A node by its index in another node, or the root.
+    #[inline(always)]
+    pub fn node(&self, index: u32) -> &Node8 {
+        debug_assert!((index as usize) < self.nodes.len());
+        // SAFETY: the root, and the children that `new` puts into nodes, are in the tree; nothing else has such an index.
+        #[allow(unsafe_code, reason = "the check is on the way from node to node")]
+        unsafe {
+            self.nodes.get_unchecked(index as usize)
+        }
+    }
+
+    /// A block by its index in a node, without [`LEAF`].
+    #[inline(always)]
+    pub fn block(&self, index: u32) -> &Block8 {
+        debug_assert!((index as usize) < self.blocks.len());
+        // SAFETY: as above.
+        #[allow(unsafe_code, reason = "as above")]
+        unsafe {
+            self.blocks.get_unchecked(index as usize)
+        }
+    }
+
     /// Bytes of nodes and blocks.
     pub fn bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.blocks.as_slice())
