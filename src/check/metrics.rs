@@ -277,7 +277,7 @@ fn spectrum_of_random_points(context: &Context) -> Finding {
     let (side, reach) = (8_u32, 16);
     let excess = |jittered: bool, inner: bool| -> Vec<f64> {
         let part = 10 + u64::from(jittered);
-        (0..u64::from(context.replicates(120, 30)))
+        (0..u64::from(context.replicates(800, 30)))
             .map(|r| {
                 let seed = context.seed_of(part, r);
                 let at = |i: u32, k: u64| {

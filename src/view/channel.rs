@@ -53,7 +53,21 @@ pub struct Inbox {
 struct Waiting {
     asks: VecDeque<Ask>,
     shown: Shown,
+    /// How many changes of keys there were so far, joined ones too.
+    sets: u64,
     closed: bool,
+}
+
+/// What [`Inbox::take`] gives.
+pub struct Taken {
+    /// Everything that waited.
+    pub asks: Vec<Ask>,
+    /// The last frame that was shown.
+    pub shown: Shown,
+    /// How many changes there were so far.
+    pub changes: u64,
+    /// How many of these were changes of keys, as the page counts them too.
+    pub sets: u64,
 }
 
 /// The last frame that was shown, and when that was heard.
@@ -72,6 +86,7 @@ impl Inbox {
         if ask.is_change() {
             self.changes.fetch_add(1, Ordering::Relaxed);
         }
+        waiting.sets += u64::from(matches!(ask, Ask::Set { .. }));
         let (is_full, last_shown) = (waiting.asks.len() >= MAX_WAITING, waiting.shown.frame);
         match (waiting.asks.back_mut(), ask) {
             (_, Ask::Shown { frame }) if frame > last_shown => {
@@ -107,8 +122,8 @@ impl Inbox {
         self.changes.load(Ordering::Relaxed)
     }
 
-    /// Everything that waits, the last frame that was shown, and how many changes these were. Waits up to `patience` for anything to come.
-    pub fn take(&self, patience: Duration) -> (Vec<Ask>, Shown, u64) {
+    /// Everything that waits. Waits up to `patience` for anything to come.
+    pub fn take(&self, patience: Duration) -> Taken {
         let mut waiting = lock(&self.waiting);
         if patience > Duration::ZERO && waiting.asks.is_empty() && !waiting.closed {
             let shown = waiting.shown;
@@ -116,7 +131,8 @@ impl Inbox {
             let waited = self.arrived.wait_timeout_while(waiting, patience, idle);
             waiting = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
-        (waiting.asks.drain(..).collect(), waiting.shown, self.changes())
+        let asks = waiting.asks.drain(..).collect();
+        Taken { asks, shown: waiting.shown, changes: self.changes(), sets: waiting.sets }
     }
 }
 

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::House;
 use super::analyst::{self, Analyst, SharedFigures};
-use super::channel::{Inbox, Outbox, Shown};
+use super::channel::{Inbox, Outbox, Shown, Taken};
 use super::document::Document;
 use super::message::View;
 use super::picture;
@@ -73,6 +73,8 @@ pub struct Studio {
     passes: u64,
     /// How many changes are taken into account.
     seen: u64,
+    /// How many of them were changes of keys.
+    sets: u64,
     /// Counts pictures that began: what was measured of another is of no use.
     epoch: u64,
     /// Counts documents that were told, so that a frame can say which it is of.
@@ -124,6 +126,7 @@ impl Studio {
             speed: Speed::default(),
             passes: 0,
             seen: 0,
+            sets: 0,
             epoch: 0,
             version: 0,
             changed: now,
@@ -146,8 +149,8 @@ impl Studio {
         }
         loop {
             let patience = if self.has_work() { Duration::ZERO } else { self.patience() };
-            let (asks, shown, seen) = self.inbox.take(patience);
-            self.seen = seen;
+            let Taken { asks, shown, changes, sets } = self.inbox.take(patience);
+            (self.seen, self.sets) = (changes, sets);
             if self.inbox.is_closed() {
                 return;
             }
@@ -178,7 +181,17 @@ impl Studio {
         if self.stopped || self.broken.is_some() || self.open.is_none() {
             return false;
         }
-        !self.sides.iter().all(Side::is_finished) || (self.rests() && self.wants_reference())
+        !self.sides.iter().all(Side::is_finished) || (self.rests() && (!self.is_exact() || self.wants_reference()))
+    }
+
+    /// Whether the pictures are those of the tree that `render` has; what the others show may differ in the last bits.
+    fn is_exact(&self) -> bool {
+        self.open.as_ref().is_some_and(|open| open.scene.has_exact_tree())
+    }
+
+    /// Whether the pictures are what they are going to be: every sample is there, of the exact tree.
+    fn is_finished(&self) -> bool {
+        self.is_exact() && self.sides.iter().all(Side::is_finished)
     }
 
     fn rests(&self) -> bool {
@@ -463,18 +476,17 @@ impl Studio {
             })
         };
         let panels: Vec<Value> = self.sides.iter().enumerate().map(panel).collect();
-        let finished = self.sides.iter().all(Side::is_finished);
         let left: f64 = self.sides.iter().map(|s| s.seconds_left(self.speed.samples_per_second())).sum();
         let state = match () {
             () if self.broken.is_some() => "broken",
             () if self.open.is_none() => "empty",
             () if self.stopped => "stopped",
-            () if !finished => "rendering",
+            () if !self.is_finished() => "rendering",
             () if self.has_work() => "refining the reference",
             () => "finished",
         };
         let status = json!({
-            "is": "status", "state": state, "panels": panels, "left": round_3(left),
+            "is": "status", "sets": self.sets, "epoch": self.epoch, "state": state, "panels": panels, "left": round_3(left),
             "samples_per_second": self.speed.samples_per_second().round(),
             "rays_per_second": self.speed.rays_per_second().round(),
             "reference": self.reference.as_ref().map_or(0, Reference::samples),

@@ -53,11 +53,13 @@ fn small() -> Serving {
 /// Waits for the picture of the document that the page has now, with all its samples.
 fn finished(page: &Page) {
     page.settle();
+    // In one look: no change is on the way, and what is shown is of the page's document, and of the picture that is said to be finished,
+    // with all its samples.
     page.wait_for(
-        "document.body?.dataset.connected === 'yes' && /finished|reference/.test(document.body.dataset.state)",
+        "(({ asked, answered, connected, state, shown, version, epoch, stateEpoch }) => connected === 'yes' && asked === answered \
+         && /finished|reference/.test(state) && shown === version && epoch === stateEpoch)(document.body?.dataset ?? {}) \
+         && / (\\d+) of \\1 spp$/.test(document.querySelector('#caption-a').textContent)",
     );
-    page.wait_for("document.body.dataset.shown === document.body.dataset.version");
-    page.wait_for("/ (\\d+) of \\1 spp$/.test(document.querySelector('#caption-a').textContent)");
 }
 
 /// RGB of what a canvas shows.
@@ -127,7 +129,6 @@ fn the_page_shows_what_render_makes_of_its_document_however_it_is_driven() {
     page.wait_for(&format!("document.body.dataset.document !== {}", json!(before.to_string())));
     let at = page.middle("#screen-a");
     page.drag(at, (at.0 + 60.0, at.1 + 20.0));
-    std::thread::sleep(std::time::Duration::from_millis(300));
     finished(&page);
     let after = document(&page);
     assert!(after["camera"]["pos"] != before["camera"]["pos"] && after["camera"]["dir"] != before["camera"]["dir"]);

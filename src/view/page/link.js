@@ -22,6 +22,7 @@ export class Link {
     };
     this.socket.onclose = () => lost();
     this.drops = 0;
+    document.body.dataset.asked = this.sets = 0;
   }
 
   get isOpen() {
@@ -29,6 +30,8 @@ export class Link {
   }
 
   ask(ask, fields = {}) {
+    // The program counts changes too: where both counts are equal, none is on the way.
+    if (ask === "set") document.body.dataset.asked = ++this.sets;
     if (this.isOpen) this.socket.send(JSON.stringify({ ask, ...fields }));
   }
 

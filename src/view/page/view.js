@@ -134,8 +134,7 @@ function row(name, values, title = "") {
 
 function showStatus(status) {
   $("#state").textContent = `– ${status.state}`;
-  document.body.dataset.state = status.state;
-  document.body.dataset.reference = status.reference;
+  Object.assign(document.body.dataset, { state: status.state, stateEpoch: status.epoch, answered: status.sets, reference: status.reference });
   const done = status.panels.reduce((sum, p) => sum + p.samples, 0);
   $("#progress").max = status.panels.reduce((sum, p) => sum + p.of, 0) || 1;
   $("#progress").value = done;
