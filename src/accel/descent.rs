@@ -11,10 +11,10 @@ use super::nodes8::{Node8, Tree8, WIDTH};
 use super::stack::{Stack, waiting};
 use super::vector8::{array, fetch};
 
-/// The kernel for a ray, compiled for `$features`; `$not_above` gives the lanes where a first number is no greater than a second, as
+/// The kernel for a ray, compiled for `$features`; `$evex` is whether these are those of AVX-512; `$not_above` gives the lanes where a first number is no greater than a second, as
 /// bits.
 macro_rules! kernel {
-    ($features:literal, $not_above:expr) => {
+    ($features:literal, $evex:literal, $not_above:expr) => {
         /// What the ray meets, as an entry: see [`single`](super::single). The processor must have the kernel's instructions.
         #[allow(
             clippy::too_many_arguments,
@@ -50,7 +50,7 @@ macro_rules! kernel {
                     let (near, far) = slabs.crossings(node, _mm256_set1_ps(limit));
                     let met = $not_above(near, far);
                     child = if met != 0 {
-                        descend::<ANY>(tree, node, near, met, &mut stack)
+                        descend::<ANY, $evex>(tree, node, near, met, &mut stack)
                     } else if let Some(next) = stack.next(limit) {
                         next
                     } else {
@@ -58,7 +58,7 @@ macro_rules! kernel {
                     };
                 }
                 let block = tree.block(child ^ LEAF);
-                let (mut met, t) = ray.test::<ANY>(block, tree.pad, limit);
+                let (mut met, t) = ray.test::<ANY, $evex>(block, tree.pad, limit);
                 if met != 0 {
                     if ANY {
                         return MET;
@@ -108,9 +108,17 @@ fn child(node: &Node8, lane: usize) -> u32 {
 
 /// The next of the children that are met, of which there is one, while the others wait: the nearest, with the nearer of the others
 /// on top. Where any hit will do the first will do too, and at no distance, since no limit will pass the others over.
+///
+/// `EVEX` changes nothing but whose function this is: one that is called from one place is compiled into it, with its features.
 #[inline]
 #[target_feature(enable = "avx2,bmi1")]
-pub(super) fn descend<const ANY: bool>(tree: &Tree8, node: &Node8, near: __m256, met: u32, stack: &mut Stack) -> u32 {
+pub(super) fn descend<const ANY: bool, const EVEX: bool>(
+    tree: &Tree8,
+    node: &Node8,
+    near: __m256,
+    met: u32,
+    stack: &mut Stack,
+) -> u32 {
     let first = met.trailing_zeros() as usize % WIDTH;
     let mut rest = met & (met - 1);
     if rest == 0 {
@@ -140,13 +148,13 @@ pub(super) fn descend<const ANY: bool>(tree: &Tree8, node: &Node8, near: __m256,
         stack.push(entry(farther));
         return child(node, nearer);
     }
-    sorted(tree, met, entry, stack)
+    sorted::<EVEX>(tree, met, entry, stack)
 }
 
 /// The nearest of three or more children, found by numbers alone.
 #[inline]
 #[target_feature(enable = "avx2,bmi1")]
-fn sorted(tree: &Tree8, mut met: u32, entry: impl Fn(usize) -> u64, stack: &mut Stack) -> u32 {
+fn sorted<const EVEX: bool>(tree: &Tree8, mut met: u32, entry: impl Fn(usize) -> u64, stack: &mut Stack) -> u32 {
     let since = stack.top();
     let mut nearest = u64::MAX;
     while met != 0 {

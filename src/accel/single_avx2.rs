@@ -11,5 +11,8 @@ use super::single::MET;
 use super::stack::{FEW, Stack, parts, waiting};
 use super::vector8::{Ray8, array};
 
-kernel!("avx2,fma,bmi1,bmi2,lzcnt,popcnt", |near, far| _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(near, far))
-    as u32);
+kernel!(
+    "avx2,fma,bmi1,bmi2,lzcnt,popcnt",
+    false,
+    |near, far| _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(near, far)) as u32
+);

@@ -11,6 +11,6 @@ use super::single::MET;
 use super::stack::{FEW, Stack, parts, waiting};
 use super::vector8::{Ray8, array};
 
-kernel!("avx512f,avx512vl,avx512bw,avx512dq,avx2,fma,bmi1,bmi2,lzcnt,popcnt", |near, far| u32::from(
+kernel!("avx512f,avx512vl,avx512bw,avx512dq,avx2,fma,bmi1,bmi2,lzcnt,popcnt", true, |near, far| u32::from(
     _mm256_cmp_ps_mask::<_CMP_LE_OQ>(near, far)
 ));

@@ -196,9 +196,10 @@ impl Ray8 {
     }
 
     /// Which triangles of a block the ray meets no farther than the limit, as bits, and where; with `ANY` below the limit.
+    /// `EVEX` is whose function this is, as in `descend`.
     #[inline]
     #[target_feature(enable = "avx")]
-    pub fn test<const ANY: bool>(&self, block: &Block8, pad: f32, limit: f32) -> (u32, __m256) {
+    pub fn test<const ANY: bool, const EVEX: bool>(&self, block: &Block8, pad: f32, limit: f32) -> (u32, __m256) {
         let zero = _mm256_setzero_ps();
         let (origin, direction) = (Vec3x8::splat(self.origin), Vec3x8::splat(self.direction));
         let at = [Vec3x8::load(&block.corners[0]), Vec3x8::load(&block.corners[1]), Vec3x8::load(&block.corners[2])];
@@ -281,7 +282,7 @@ impl Slabs {
     }
 }
 
-/// Asks for a child's cache lines, before they are read.
+/// Asks for a child's cache lines, before they are read: five of a block, four of a node and the next one's first.
 #[inline]
 #[target_feature(enable = "avx")]
 pub(super) fn fetch(tree: &Tree8, child: u32) {
@@ -290,7 +291,7 @@ pub(super) fn fetch(tree: &Tree8, child: u32) {
     } else {
         tree.blocks.as_ptr().wrapping_add((child ^ LEAF) as usize).cast::<i8>()
     };
-    for line in 0..4 {
+    for line in 0..5 {
         _mm_prefetch::<_MM_HINT_T0>(at.wrapping_add(64 * line));
     }
 }
