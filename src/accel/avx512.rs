@@ -9,10 +9,9 @@ use std::mem::MaybeUninit;
 
 use super::beam::{Beam, MIXED};
 use super::build::Accel;
-use super::lone;
+use super::lone::{self, Way};
 use super::packet::{LANES, NOTHING, Packet};
 use super::packet_tree::{Corners, PacketNode, PacketTree, Planes, WIDTH};
-use super::single::Way;
 use super::stack::{FEW, Stack};
 use super::vector16::{Vec3x16, load, store};
 
@@ -264,12 +263,12 @@ const FEW_BOXES: u32 = 2;
 fn traverse<const ANY: bool, const OCTANT: u8>(tree: &PacketTree, pad: f32, rays: &mut Rays) {
     let mut few = [MaybeUninit::uninit(); FEW];
     let mut many = Vec::new();
-    let mut stack = Stack::new(if tree.waiting <= FEW {
-        &mut few
-    } else {
+    if tree.waiting > FEW {
         many.resize(tree.waiting, MaybeUninit::uninit());
-        &mut many
-    });
+    }
+    // SAFETY: there is room for the most that waits.
+    #[allow(unsafe_code, reason = "a stack that does not check")]
+    let mut stack = unsafe { Stack::new(if tree.waiting > FEW { &mut many } else { &mut few }) };
     let beam = Beam::around::<OCTANT>(&rays.origin, &rays.direction, &rays.reciprocal, pad);
     let mut end = beam.end(rays.farthest());
     let is_large = tree.nodes.len() > FEW_NODES;

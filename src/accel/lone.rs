@@ -10,9 +10,34 @@ use glam::Vec3;
 
 use super::packet::NOTHING;
 use super::packet_tree::{Corners, PacketNode, PacketTree, WIDTH};
-use super::single::Way;
 use super::stack::{FEW, Stack, waiting};
 use super::vector8::{Vec3x8, array, load};
+
+/// A ray on its way, with what it has met so far.
+pub(super) struct Way {
+    pub origin: Vec3,
+    pub direction: Vec3,
+    pub reciprocal: Vec3,
+    /// Nearest distance so far, or the limit.
+    pub limit: f32,
+    pub triangle: u32,
+}
+
+impl Way {
+    /// The rows of a node's planes that the ray passes first, by axis; the others have the last bit of the index flipped.
+    #[inline(always)]
+    fn near_planes(&self) -> [usize; 3] {
+        [0, 1, 2].map(|axis| 2 * axis + usize::from(self.reciprocal[axis].is_sign_negative()))
+    }
+
+    /// Takes a hit below the limit, or a tie with a higher triangle; a limit is not a hit.
+    #[inline(always)]
+    fn take(&mut self, t: f32, id: u32) {
+        if t < self.limit || (t == self.limit && id < self.triangle && self.triangle != NOTHING) {
+            (self.limit, self.triangle) = (t, id);
+        }
+    }
+}
 
 /// Three coordinates of up to four vectors.
 #[derive(Clone, Copy)]
@@ -96,8 +121,8 @@ impl Lone {
     #[target_feature(enable = "avx")]
     fn new(way: &Way) -> Self {
         Self {
-            origin: Vec3x8::splat(way.origin),
-            reciprocal: Vec3x8::splat(way.reciprocal),
+            origin: Vec3x8::splat(way.origin.extend(0.0).to_array()),
+            reciprocal: Vec3x8::splat(way.reciprocal.extend(0.0).to_array()),
             near_planes: way.near_planes(),
             from: Vec3x4::splat(way.origin),
             direction: Vec3x4::splat(way.direction),
@@ -156,12 +181,12 @@ pub(super) fn trace<const ANY: bool>(tree: &PacketTree, way: &mut Way) {
     let ray = Lone::new(way);
     let mut few = [MaybeUninit::uninit(); FEW];
     let mut many = Vec::new();
-    let mut stack = Stack::new(if tree.waiting <= FEW {
-        &mut few
-    } else {
+    if tree.waiting > FEW {
         many.resize(tree.waiting, MaybeUninit::uninit());
-        &mut many
-    });
+    }
+    // SAFETY: there is room for the most that waits.
+    #[allow(unsafe_code, reason = "a stack that does not check")]
+    let mut stack = unsafe { Stack::new(if tree.waiting > FEW { &mut many } else { &mut few }) };
     let mut index = 0;
     loop {
         let node = &tree.nodes[index as usize];
@@ -217,7 +242,7 @@ impl PacketTree {
         let near = array(near);
         self.fetch(node.children[place]);
         let mut nearest = waiting(near[place], node.children[place]);
-        let bottom = stack.len();
+        let since = stack.top();
         while met != 0 {
             let place = met.trailing_zeros() as usize % WIDTH;
             met &= met - 1;
@@ -229,7 +254,7 @@ impl PacketTree {
             if ANY {
                 stack.push(farther);
             } else {
-                stack.insert(farther, bottom);
+                stack.insert(farther, since);
             }
         }
         nearest as u32

@@ -14,6 +14,8 @@ mod avx512;
 mod beam;
 mod build;
 #[cfg(target_arch = "x86_64")]
+mod descent;
+#[cfg(target_arch = "x86_64")]
 mod lone;
 mod nodes8;
 mod packet;

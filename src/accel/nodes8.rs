@@ -4,7 +4,7 @@
 //! Ylitie, Karras and Laine 2017, doi:10.1145/3105762.3105773): a subtree may be cut into up to seven pieces that its parent
 //! takes as children of its own, or, with eight triangles or fewer, become one leaf.
 
-use super::build::{Accel, Child, Node};
+use super::build::{Accel, Child, Node, Slot};
 use super::{Bounds, pages};
 
 /// Children of a node, and triangles of a block.
@@ -69,6 +69,23 @@ impl Node8 {
 impl Block8 {
     /// Triangles in one point.
     const EMPTY: Self = Self { corners: [[[0.0; WIDTH]; 3]; 3], ids: [super::NOTHING; WIDTH] };
+
+    fn set(&mut self, lane: usize, slot: &Slot) {
+        for (rows, corner) in self.corners.iter_mut().zip(&slot.corners) {
+            rows.iter_mut().zip(corner.to_array()).for_each(|(row, c)| row[lane] = c);
+        }
+        self.ids[lane] = slot.id;
+    }
+
+    /// Fills the lanes from `count` ≥ 1 on.
+    fn repeat_last(&mut self, count: usize) {
+        for row in self.corners.as_flattened_mut() {
+            let last = row[count - 1];
+            row[count..].fill(last);
+        }
+        let last = self.ids[count - 1];
+        self.ids[count..].fill(last);
+    }
 }
 
 /// A subtree of the binary tree as its parent knows it.
@@ -84,6 +101,8 @@ struct Costs {
     /// In at most 1, 2, … 7 pieces.
     pieces: [f32; WIDTH - 1],
     triangles: u32,
+    /// How many of at most 2, 3, … 8 pieces of its two children the first child gets.
+    first: [u8; WIDTH - 1],
 }
 
 /// The binary tree with the costs of its nodes.
@@ -106,7 +125,7 @@ impl Tree8 {
         tree.blocks = pages::with_capacity(blocks + 1);
         tree.blocks.push(Block8::EMPTY);
         tree.nodes.push(Node8::EMPTY);
-        let mut pieces = Vec::with_capacity(WIDTH);
+        let (mut pieces, mut scratch) = (Vec::with_capacity(WIDTH), Vec::new());
         // (our node, binary node, level)
         let mut open = vec![(0usize, 0usize, 1usize)];
         while let Some((at, binary, level)) = open.pop() {
@@ -116,7 +135,7 @@ impl Tree8 {
             for (k, piece) in pieces.iter().enumerate() {
                 let child = match collapse.inner(piece) {
                     None => {
-                        tree.blocks.push(collapse.block(piece));
+                        tree.blocks.push(collapse.block(piece, &mut scratch));
                         LEAF | small(tree.blocks.len() - 1)
                     }
                     Some(inner) => {
@@ -132,6 +151,28 @@ impl Tree8 {
             }
         }
         tree
+    }
+
+    /// A node by its index in another node, or the root.
+    #[inline(always)]
+    pub fn node(&self, index: u32) -> &Node8 {
+        debug_assert!((index as usize) < self.nodes.len());
+        // SAFETY: the root, and the children that `new` puts into nodes, are in the tree; nothing else has such an index.
+        #[allow(unsafe_code, reason = "the check is on the way from node to node")]
+        unsafe {
+            self.nodes.get_unchecked(index as usize)
+        }
+    }
+
+    /// A block by its index in a node, without [`LEAF`].
+    #[inline(always)]
+    pub fn block(&self, index: u32) -> &Block8 {
+        debug_assert!((index as usize) < self.blocks.len());
+        // SAFETY: as above.
+        #[allow(unsafe_code, reason = "as above")]
+        unsafe {
+            self.blocks.get_unchecked(index as usize)
+        }
     }
 
     /// Bytes of nodes and blocks.
@@ -154,9 +195,20 @@ fn parts(node: &Node) -> [Part; 2] {
     [0, 1].map(|side| Part { bounds: node.bounds[side], child: node.children[side] })
 }
 
+/// Least costs of two subtrees in at most 2, 3, … 8 pieces together, and how many of them the first one gets.
+fn best_splits(a: &[f32; WIDTH - 1], b: &[f32; WIDTH - 1]) -> [(f32, u8); WIDTH - 1] {
+    std::array::from_fn(|k| {
+        // At most k + 2 pieces: k + 1 of the first and 1 of the second, or …
+        (1..=k).fold((a[0] + b[k], 1), |best, first| {
+            let cost = a[first] + b[k - first];
+            if cost < best.0 { (cost, first as u8 + 1) } else { best }
+        })
+    })
+}
+
 impl<'a> Collapse<'a> {
     fn new(accel: &'a Accel) -> Self {
-        let unset = Costs { pieces: [0.0; WIDTH - 1], triangles: 0 };
+        let unset = Costs { pieces: [0.0; WIDTH - 1], triangles: 0, first: [1; WIDTH - 1] };
         let mut collapse = Self { accel, costs: vec![unset; accel.nodes.len()] };
         // A node's children come after it.
         for n in (0..accel.nodes.len()).rev() {
@@ -169,13 +221,14 @@ impl<'a> Collapse<'a> {
         let [a, b] = parts(&self.accel.nodes[n]);
         let area = half_area(&Bounds { min: a.bounds.min.min(b.bounds.min), max: a.bounds.max.max(b.bounds.max) });
         let triangles = self.triangles(&a) + self.triangles(&b);
-        let as_node = area * NODE_COST + self.best_split(&[a, b], WIDTH).0;
+        let splits = best_splits(&self.pieces(&a), &self.pieces(&b));
+        let as_node = area * NODE_COST + splits[WIDTH - 2].0;
         let as_leaf = if triangles as usize <= WIDTH { area * BLOCK_COST } else { f32::INFINITY };
         let mut pieces = [as_node.min(as_leaf); WIDTH - 1];
         for most in 2..WIDTH {
-            pieces[most - 1] = self.best_split(&[a, b], most).0.min(pieces[most - 2]);
+            pieces[most - 1] = splits[most - 2].0.min(pieces[most - 2]);
         }
-        Costs { pieces, triangles }
+        Costs { pieces, triangles, first: splits.map(|(_, first)| first) }
     }
 
     fn triangles(&self, part: &Part) -> u32 {
@@ -185,24 +238,18 @@ impl<'a> Collapse<'a> {
         }
     }
 
-    /// Cost of a subtree in at most `most` ∈ 1..=7 pieces.
-    fn cost(&self, part: &Part, most: usize) -> f32 {
+    /// Costs of a subtree in at most 1, 2, … 7 pieces.
+    fn pieces(&self, part: &Part) -> [f32; WIDTH - 1] {
         match part.child.split() {
-            Ok(_) => half_area(&part.bounds) * BLOCK_COST,
-            Err(inner) => self.costs[inner].pieces[most - 1],
+            Ok(_) => [half_area(&part.bounds) * BLOCK_COST; WIDTH - 1],
+            Err(inner) => self.costs[inner].pieces,
         }
-    }
-
-    /// Least cost of two subtrees in at most `most` ≥ 2 pieces together, and how many of them the first one gets.
-    fn best_split(&self, [a, b]: &[Part; 2], most: usize) -> (f32, usize) {
-        let cost = |first: usize| self.cost(a, first) + self.cost(b, most - first);
-        (2..most).fold((cost(1), 1), |best, first| if cost(first) < best.0 { (cost(first), first) } else { best })
     }
 
     /// The children of the 8-wide node over binary node `n`, or the pieces of its subtree.
     fn cut(&self, n: usize, most: usize, pieces: &mut Vec<Part>) {
         let both = parts(&self.accel.nodes[n]);
-        let (_, first) = self.best_split(&both, most);
+        let first = usize::from(self.costs[n].first[most - 2]);
         for (part, most) in both.iter().zip([first, most - first]) {
             self.cut_part(part, most, pieces);
         }
@@ -230,28 +277,24 @@ impl<'a> Collapse<'a> {
         (!fits || cost < half_area(&part.bounds) * BLOCK_COST).then_some(inner)
     }
 
-    /// The triangles of a piece that is a leaf.
-    fn block(&self, part: &Part) -> Block8 {
+    /// The triangles of a piece that is a leaf; `open` is scratch.
+    fn block(&self, part: &Part, open: &mut Vec<Child>) -> Block8 {
         let mut block = Block8::EMPTY;
         let mut count = 0;
-        let mut open = vec![part.child];
+        open.clear();
+        open.push(part.child);
         while let Some(child) = open.pop() {
             match child.split() {
                 Err(inner) => open.extend(self.accel.nodes[inner].children),
                 Ok(slots) => {
                     for slot in &self.accel.slots[slots] {
-                        // To the end, so that what is not overwritten repeats the last one.
-                        for lane in count..WIDTH {
-                            for (rows, corner) in block.corners.iter_mut().zip(&slot.corners) {
-                                rows.iter_mut().zip(corner.to_array()).for_each(|(row, c)| row[lane] = c);
-                            }
-                            block.ids[lane] = slot.id;
-                        }
+                        block.set(count, slot);
                         count += 1;
                     }
                 }
             }
         }
+        block.repeat_last(count);
         block
     }
 

@@ -9,7 +9,7 @@
 //! (`distances` in `vector8.rs`).
 //!
 //! The portable kernel has nothing unsafe in it, and is all that Miri sees: `cargo miri test --lib accel::single` checks the tree and
-//! the reference; what is unsafe in the others is loads, stores and the stack of what waits.
+//! the reference; what is unsafe in the others is loads, stores, children that are not checked to exist, and the stack of what waits.
 
 #![allow(clippy::needless_range_loop, reason = "a lane is a column of several rows at once")]
 
@@ -17,76 +17,46 @@ use glam::Vec3;
 
 use super::build::Accel;
 use super::nodes8::{Block8, LEAF, Node8, Tree8, WIDTH};
-use super::packet::NOTHING;
 use super::stack::{FEW, parts, waiting};
 use super::{Bounds, Hit, Kernel, Ray, larger, meet, reciprocal_of, slab, smaller};
 
-/// A ray on its way, with what it has met so far.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Way {
-    pub origin: Vec3,
-    pub direction: Vec3,
-    pub reciprocal: Vec3,
-    /// Nearest distance so far, or the limit.
-    pub limit: f32,
-    pub triangle: u32,
-}
-
-impl Way {
-    #[inline(always)]
-    fn new(ray: &Ray, limit: f32) -> Self {
-        let reciprocal = reciprocal_of(ray.direction);
-        Self { origin: ray.origin, direction: ray.direction, reciprocal, limit, triangle: NOTHING }
-    }
-
-    /// The rows of a node's planes that the ray passes first, by axis; the others have the last bit of the index flipped.
-    #[inline(always)]
-    pub fn near_planes(&self) -> [usize; 3] {
-        [0, 1, 2].map(|axis| 2 * axis + usize::from(self.reciprocal[axis].is_sign_negative()))
-    }
-
-    /// Takes a hit below the limit, or a tie with a higher triangle; a limit is not a hit.
-    #[inline(always)]
-    pub fn take(&mut self, t: f32, id: u32) {
-        if t < self.limit || (t == self.limit && id < self.triangle && self.triangle != NOTHING) {
-            (self.limit, self.triangle) = (t, id);
-        }
-    }
-}
+/// That something is met, where it does not matter what: an entry less than that of any limit that can be met below.
+pub(super) const MET: u64 = 0;
 
 impl Accel {
     /// The nearest hit of one ray below `limit`.
     ///
-    /// The first call collapses the tree for single rays, in about a quarter of the time that the tree took.
+    /// The first call collapses the tree for single rays, in about a sixth of the time that the tree took.
     pub fn closest_one(&self, ray: &Ray, limit: f32) -> Option<Hit> {
-        let mut way = Way::new(ray, limit);
-        self.trace_one::<false>(&mut way);
-        (way.triangle != NOTHING).then_some(Hit { t: way.limit, triangle: way.triangle })
+        hit(run::<false>(self.kernel, self.single_rays(), ray, limit), limit)
     }
 
     /// Whether one ray meets anything below `limit`. The first call is as that of [`Self::closest_one`].
     pub fn occluded_one(&self, ray: &Ray, limit: f32) -> bool {
-        let mut way = Way::new(ray, limit);
-        self.trace_one::<true>(&mut way);
-        way.triangle != NOTHING
-    }
-
-    #[inline(always)]
-    fn trace_one<const ANY: bool>(&self, way: &mut Way) {
-        run::<ANY>(self.kernel, self.single_rays(), way);
+        hit(run::<true>(self.kernel, self.single_rays(), ray, limit), limit).is_some()
     }
 }
 
-/// Finds the nearest hit, or any. The processor must have the kernel.
+/// What an entry says that was below `limit` over 0 at first.
 #[inline(always)]
-fn run<const ANY: bool>(kernel: Kernel, tree: &Tree8, way: &mut Way) {
+fn hit(entry: u64, limit: f32) -> Option<Hit> {
+    let (t, triangle) = parts(entry);
+    (entry != waiting(limit, 0)).then_some(Hit { t, triangle })
+}
+
+/// Finds the nearest hit, or any, as an entry: distance over triangle, of which the least is the nearest and of equally near ones
+/// the lowest triangle; [`MET`] for any; `limit` over 0 where there is none, so that a hit at the limit is not less.
+/// The processor must have the kernel.
+#[inline(always)]
+fn run<const ANY: bool>(kernel: Kernel, tree: &Tree8, ray: &Ray, limit: f32) -> u64 {
+    let Ray { origin: o, direction: d } = *ray;
     match kernel {
         #[cfg(target_arch = "x86_64")]
         Kernel::Avx512 => {
             // SAFETY: a tree has a kernel only where the processor has its instructions.
             #[allow(unsafe_code, reason = "calling a function compiled for features that were detected")]
             unsafe {
-                super::single_avx512::trace::<ANY>(tree, way);
+                super::single_avx512::trace::<ANY>(tree, o.x, o.y, o.z, d.x, d.y, d.z, limit)
             }
         }
         #[cfg(target_arch = "x86_64")]
@@ -94,16 +64,26 @@ fn run<const ANY: bool>(kernel: Kernel, tree: &Tree8, way: &mut Way) {
             // SAFETY: as above.
             #[allow(unsafe_code, reason = "calling a function compiled for features that were detected")]
             unsafe {
-                super::single_avx2::trace::<ANY>(tree, way);
+                super::single_avx2::trace::<ANY>(tree, o.x, o.y, o.z, d.x, d.y, d.z, limit)
             }
         }
-        _ => trace::<ANY>(tree, way),
+        _ => trace::<ANY>(tree, ray, limit),
     }
 }
 
+/// A ray and the reciprocal of its direction.
+struct Way {
+    origin: Vec3,
+    direction: Vec3,
+    reciprocal: Vec3,
+}
+
 /// The reference: plain loops over lanes, nothing unsafe.
-fn trace<const ANY: bool>(tree: &Tree8, way: &mut Way) {
-    let near_planes = way.near_planes();
+fn trace<const ANY: bool>(tree: &Tree8, ray: &Ray, limit: f32) -> u64 {
+    let way = Way { origin: ray.origin, direction: ray.direction, reciprocal: reciprocal_of(ray.direction) };
+    // The rows of a node's planes that the ray passes first, by axis; the others have the last bit of the index flipped.
+    let near_planes = [0, 1, 2].map(|axis| 2 * axis + usize::from(way.reciprocal[axis].is_sign_negative()));
+    let mut best = waiting(limit, 0);
     let mut stack = [0u64; FEW];
     let mut heap = Vec::new();
     let stack: &mut [u64] = if tree.waiting <= FEW {
@@ -116,18 +96,20 @@ fn trace<const ANY: bool>(tree: &Tree8, way: &mut Way) {
     while count > 0 {
         count -= 1;
         let (near, child) = parts(stack[count]);
-        if near > way.limit {
+        let limit = parts(best).0;
+        if near > limit {
             continue;
         }
         if child & LEAF != 0 {
-            test::<ANY>(&tree.blocks[(child ^ LEAF) as usize], tree.pad, way);
-            if ANY && way.triangle != NOTHING {
-                return;
+            let nearest = test(&tree.blocks[(child ^ LEAF) as usize], tree.pad, &way, best);
+            if ANY && nearest != best {
+                return MET;
             }
+            best = nearest;
             continue;
         }
         let node = &tree.nodes[child as usize];
-        let (near, met) = crossings(node, way, near_planes);
+        let (near, met) = crossings(node, &way, limit, near_planes);
         let first = count;
         for k in 0..WIDTH {
             if met[k] {
@@ -143,35 +125,36 @@ fn trace<const ANY: bool>(tree: &Tree8, way: &mut Way) {
             }
         }
     }
+    best
 }
 
 /// Where the ray enters the boxes of a node, 0 at the least, and which of them it meets no farther than its limit.
 #[inline(always)]
-fn crossings(node: &Node8, way: &Way, near_planes: [usize; 3]) -> ([f32; WIDTH], [bool; WIDTH]) {
+fn crossings(node: &Node8, way: &Way, limit: f32, near_planes: [usize; 3]) -> ([f32; WIDTH], [bool; WIDTH]) {
     let (mut near, mut met) = ([0.0; WIDTH], [false; WIDTH]);
     let [x, y, z] = near_planes.map(|row| [&node.planes[row], &node.planes[row ^ 1]]);
     for k in 0..WIDTH {
         let at = |planes: &[f32; WIDTH], axis: usize| (planes[k] - way.origin[axis]) * way.reciprocal[axis];
         near[k] = larger(larger(at(x[0], 0), at(y[0], 1)), larger(at(z[0], 2), 0.0));
-        let far = smaller(smaller(at(x[1], 0), at(y[1], 1)), smaller(at(z[1], 2), way.limit));
+        let far = smaller(smaller(at(x[1], 0), at(y[1], 1)), smaller(at(z[1], 2), limit));
         met[k] = near[k] <= far;
     }
     (near, met)
 }
 
-/// Tests the triangles of a block.
+/// The least of an entry and those of the triangles of a block that are hit no farther.
 #[inline(always)]
-fn test<const ANY: bool>(block: &Block8, pad: f32, way: &mut Way) {
-    for k in 0..WIDTH {
+fn test(block: &Block8, pad: f32, way: &Way, best: u64) -> u64 {
+    let limit = parts(best).0;
+    let nearest = |best: u64, k: usize| {
         let corners =
             [0, 1, 2].map(|c: usize| Vec3::from_array([0, 1, 2].map(|axis: usize| block.corners[c][axis][k])));
         let Bounds { min, max } = super::Triangle { corners }.bounds(pad);
         let (near, far) = slab(min, max, way.origin, way.reciprocal);
         let t = meet(&corners, near, far, way.origin, way.direction);
-        if t > 0.0 {
-            way.take(t, block.ids[k]);
-        }
-    }
+        if t > 0.0 && t <= limit { best.min(waiting(t, block.ids[k])) } else { best }
+    };
+    (0..WIDTH).fold(best, nearest)
 }
 
 #[cfg(test)]
@@ -204,7 +187,7 @@ mod tests {
         #[test]
         fn every_kernel_meets_what_brute_force_meets(
             corners in prop::collection::vec([vector(), vector(), vector()], 0..60),
-            rays in prop::collection::vec((vector(), vector(), prop_oneof![Just(f32::INFINITY), Just(1.0), 0.0f32..3.0]), 16),
+            rays in prop::collection::vec((vector(), vector(), prop_oneof![Just(f32::INFINITY), Just(1.0), 0.0f32..3.0, Just(0.0), Just(-0.0), Just(-1.0)]), 16),
             power in prop_oneof![Just(0i32), Just(-20), Just(20)],
             deep in any::<bool>(),
         ) {
@@ -222,12 +205,10 @@ mod tests {
                 let ray = Ray { origin: origin * scale, direction: direction * scale };
                 let truth = brute_force(&triangles, reach, &ray, limit);
                 for kernel in Kernel::available() {
-                    let (mut closest, mut any) = (Way::new(&ray, limit), Way::new(&ray, limit));
-                    run::<false>(kernel, &tree, &mut closest);
-                    run::<true>(kernel, &tree, &mut any);
-                    let found = (closest.triangle != NOTHING).then_some(Hit { t: closest.limit, triangle: closest.triangle });
-                    prop_assert_eq!(found, truth, "{}: {:?}", kernel, ray);
-                    prop_assert_eq!(any.triangle != NOTHING, truth.is_some(), "{}: {:?}", kernel, ray);
+                    let closest = hit(run::<false>(kernel, &tree, &ray, limit), limit);
+                    let any = hit(run::<true>(kernel, &tree, &ray, limit), limit);
+                    prop_assert_eq!(closest, truth, "{}: {:?}", kernel, ray);
+                    prop_assert_eq!(any.is_some(), truth.is_some(), "{}: {:?}", kernel, ray);
                 }
             }
         }
