@@ -2,7 +2,8 @@
 //!
 //! The operations and their order are those of [`slab`](super::slab) and [`meet`](super::meet), written as instructions; what differs from the
 //! portable kernel is the bookkeeping: masks stay masks, the packet's [`Beam`] is tested against eight boxes before any ray is, and a packet
-//! whose rays all run into one octant knows which planes of a box are the near ones.
+//! whose rays all run into one octant knows which planes of a box are the near ones. Rays that have too little in common go through the same
+//! tree one by one ([`lone`]).
 
 use std::arch::x86_64::*;
 use std::mem::MaybeUninit;
@@ -285,7 +286,7 @@ fn traverse<const ANY: bool, const OCTANT: u8>(tree: &PacketTree, pad: f32, rays
             met &= u32::from(_mm256_cmp_ps_mask::<_CMP_LE_OQ>(near, _mm256_set1_ps(end)));
         }
         let mut inner = met & node.used & !node.triangles;
-        // Camera rays of a pixel are so close together that their beam is as good as they are; shadow rays where they meet few boxes.
+        // Camera rays of a pixel are so close together that their beam is as good as they are.
         if is_large && (OCTANT == MIXED || (ANY && inner.count_ones() > FEW_BOXES)) {
             inner = rays.meet_inner::<OCTANT>(node, inner);
         }

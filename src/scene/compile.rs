@@ -269,7 +269,7 @@ impl Scene {
     ///
     /// A triangle takes 100 bytes of the mesh, and what was read of its file, some 40, may not be back with the system yet. While the tree
     /// is built, 36 of corners, 32 of its box, and in the builder 4 of an index, 16 of keys to sort by, 96 of nodes that are merged and 96
-    /// of the tree's are added: 420. Afterwards 128 of its face, 75 of the binary tree and 87 of the one for wide registers: 430 as
+    /// of the tree's are added: 420. Afterwards 128 of its face, 75 of the binary tree and 89 of the one for wide registers: 432 as
     /// measured on landscapes, 460 (`BUILD_BYTES`) for trees whose nodes are less full.
     pub fn most_bytes(mesh: &Mesh, pixels: u64) -> u64 {
         BUILD_BYTES * mesh.len() as u64
