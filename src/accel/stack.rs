@@ -31,7 +31,8 @@ pub(super) struct Stack<'a> {
 #[allow(unsafe_code, reason = "entries are written before they are read, and no more than there is room for")]
 impl<'a> Stack<'a> {
     /// # Safety
-    /// There must be room for all that will ever wait: one entry must be taken for every one pushed beyond it.
+    /// There must be room for all that will ever wait at once.
+    // SAFETY: `push` and `insert` rest on this promise.
     #[inline(always)]
     pub unsafe fn new(entries: &'a mut [MaybeUninit<u64>]) -> Self {
         let bottom = entries.as_mut_ptr().cast();

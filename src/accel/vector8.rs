@@ -264,10 +264,7 @@ impl Slabs {
     pub fn crossings(&self, node: &Node8, limit: __m256) -> (__m256, __m256) {
         let at = |row: usize, scale: __m256, offset: __m256| {
             // SAFETY: `Ray8::new` gives the places of rows of planes, with which a node begins.
-            #[allow(
-                unsafe_code,
-                reason = "a row's place in bytes, so that it need not be made of its number at every node"
-            )]
+            #[allow(unsafe_code, reason = "a place in bytes need not be made of a row's number at every node")]
             let planes = unsafe { _mm256_load_ps((&raw const *node).cast::<f32>().byte_add(row)) };
             _mm256_fmadd_ps(planes, scale, offset)
         };
