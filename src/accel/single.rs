@@ -8,8 +8,10 @@
 //! [`meet`] over all triangles. The wider kernels may find a plane up to a few roundings nearer and farther, which is as safe
 //! (`distances` in `vector8.rs`).
 //!
-//! The portable kernel has nothing unsafe in it, and is all that Miri sees: `cargo miri test --lib accel::single` checks the tree and
-//! the reference; what is unsafe in the others is loads, stores, children that are not checked to exist, and the stack of what waits.
+//! The portable kernel has nothing unsafe in it, and is all that Miri sees: `cargo +nightly miri test --lib accel::single` checks
+//! the tree and the reference, with `MIRIFLAGS="-Zmiri-tree-borrows -Zmiri-ignore-leaks"`, since the thread pool that builds the tree
+//! breaks the older rules and outlives the test. What is unsafe in the other kernels is loads, stores, children that are not
+//! checked to exist, and the stack of what waits.
 
 #![allow(clippy::needless_range_loop, reason = "a lane is a column of several rows at once")]
 
@@ -27,11 +29,13 @@ impl Accel {
     /// The nearest hit of one ray below `limit`.
     ///
     /// The first call collapses the tree for single rays, in about a sixth of the time that the tree took.
+    #[inline]
     pub fn closest_one(&self, ray: &Ray, limit: f32) -> Option<Hit> {
         hit(run::<false>(self.kernel, self.single_rays(), ray, limit), limit)
     }
 
     /// Whether one ray meets anything below `limit`. The first call is as that of [`Self::closest_one`].
+    #[inline]
     pub fn occluded_one(&self, ray: &Ray, limit: f32) -> bool {
         hit(run::<true>(self.kernel, self.single_rays(), ray, limit), limit).is_some()
     }
@@ -78,7 +82,9 @@ struct Way {
     reciprocal: Vec3,
 }
 
-/// The reference: plain loops over lanes, nothing unsafe.
+/// The reference: plain loops over lanes, nothing unsafe. It is not compiled into its caller, where it would be the reason that a
+/// ray's numbers are loaded two at a time: those that were just stored one at a time are long in coming then.
+#[inline(never)]
 fn trace<const ANY: bool>(tree: &Tree8, ray: &Ray, limit: f32) -> u64 {
     let way = Way { origin: ray.origin, direction: ray.direction, reciprocal: reciprocal_of(ray.direction) };
     // The rows of a node's planes that the ray passes first, by axis; the others have the last bit of the index flipped.
