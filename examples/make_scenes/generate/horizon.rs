@@ -7,7 +7,7 @@ use std::path::Path;
 
 use glam::DVec3;
 use sampler_lab::error::Result;
-use sampler_lab::film::write_png_rgb8;
+use sampler_lab::film::write_small_png_rgb8;
 
 use super::obj::{Corner, Material, Obj};
 
@@ -76,5 +76,5 @@ fn write_checker(path: &Path) -> Result<()> {
         let is_pale = (i % side < TEXELS) == (i / side >= TEXELS);
         if is_pale { PALE } else { DARK }
     });
-    write_png_rgb8(path, side, side, &texels.collect::<Vec<u8>>())
+    write_small_png_rgb8(path, side, side, &texels.collect::<Vec<u8>>())
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use sampler_lab::error::Result;
-use sampler_lab::film::write_png_rgb8;
+use sampler_lab::film::write_small_png_rgb8;
 
 /// A colour as a screen shows it: sRGB, each in [0, 1].
 pub type Screen = [f64; 3];
@@ -32,7 +32,7 @@ impl Marble {
             let centre = |k: u32| (f64::from(k) + 0.5) / f64::from(SIZE);
             self.colour(centre(i % SIZE), centre(i / SIZE)).map(|c| (c.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
         });
-        write_png_rgb8(path, SIZE, SIZE, &texels.collect::<Vec<u8>>())
+        write_small_png_rgb8(path, SIZE, SIZE, &texels.collect::<Vec<u8>>())
     }
 
     /// Colour at (x, y), periodic with period 1 in both.
