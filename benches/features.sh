@@ -16,7 +16,7 @@ cp "$root/Cargo.lock" "$work/crate/Cargo.lock"
 {
     printf '[package]\nname = "features"\nversion = "0.0.0"\nedition = "2024"\n[features]\nmutants = []\n[workspace]\n[dependencies]\n'
     grep -E '^(exr|glam|image|libm|miniz_oxide|obvhs|rayon|serde|serde_json|sha2|tobj) = ' "$root/Cargo.toml"
-    printf '[lints.rust]\n'
+    printf '[lints.rust]\nunused = "allow"\n'
     grep '^unexpected_cfgs' "$root/Cargo.toml"
     printf '[profile.release]\nlto = "thin"\ncodegen-units = 4\n'
 } >"$work/crate/Cargo.toml"
